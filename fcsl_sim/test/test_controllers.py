@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import zlib
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import pytest
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
 from fcsl_sim.sim_twin import SimTwin
+from simclient import AlgTwin
 from simclient.bag import Bag, columns
 
 TEST = Path(__file__).resolve().parent
@@ -201,6 +203,44 @@ def test_a_companion_continues_from_a_checkpoint(load_two: Load) -> None:
             second.run(1)
             rest.append(second.get("b.outputs.free"))
     assert rest == whole[77:]
+
+
+def with_requirement(path: Path) -> int:
+    """Gives a machine a requirement that remembers; returns the bytes of its struct."""
+    config = json.loads(path.read_text())
+    config["requirements"] = [{"id": "U", "text": "u is kept.", "then": "held(hold.outputs.u < 1.0, 0.5)"}]
+    path.write_text(json.dumps(config))
+    with AlgTwin.from_config(path) as twin:
+        return twin.machine.size
+
+
+def test_requirements_of_a_companion_continue_from_a_checkpoint(load_two: Load, tmp_path: Path) -> None:
+    sizes: list[int] = []
+    config = load_two(lambda c: sizes.append(with_requirement(tmp_path / "slow.json")))
+    with Simulation(config.plan, config.tables) as first, Simulation(config.plan, config.tables) as second:
+        first.run(77)
+        saved = first.checkpoint()
+        first.run(50)
+        second.restore_checkpoint(saved)
+        second.run(50)
+        assert second.checkpoint() == first.checkpoint()
+        assert second.checkpoint() != saved
+        second.restore_checkpoint(as_version_1(saved, sizes[0]))
+        assert second.tick == 77
+
+
+def as_version_1(saved: bytes, size: int) -> bytes:
+    """As an older program wrote it: no size before the struct of the companion's machine, no memory behind it."""
+    plant = len(saved) - 4 - int.from_bytes(saved[32:40], "little")
+    memory = re.compile(rb"[0-9a-f]{128}").search(saved, plant)
+    assert memory is not None
+    begin = memory.start() - size
+    end = begin + int.from_bytes(saved[begin - 4 : begin], "little")
+    content = bytearray(saved[: begin - 4] + saved[begin : begin + size] + saved[end:-4])
+    content[8:12] = (1).to_bytes(4, "little")
+    content[16:24] = (len(content) + 4).to_bytes(8, "little")
+    content[32:40] = (len(content) - plant).to_bytes(8, "little")
+    return bytes(content) + zlib.crc32(content).to_bytes(4, "little")
 
 
 def test_a_checkpoint_of_other_delays_is_refused(load_two: Load) -> None:

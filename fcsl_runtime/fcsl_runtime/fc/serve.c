@@ -12,7 +12,8 @@ static fcsl_vars_status_t result(int status)
     return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
 }
 
-static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+static fcsl_vars_status_t restore(void *ctx, const void *data, uint32_t size, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error)
 {
     loop_t *loop = ctx;
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
@@ -30,7 +31,7 @@ static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim
         return FCSL_VARS_REFUSED;
     }
     const int was_armed = fcsl_run_is_armed(loop->run);
-    const fcsl_vars_status_t status = result(fcsl_run_restore(loop->run, data, machine->size, error));
+    const fcsl_vars_status_t status = result(fcsl_run_restore(loop->run, data, size, error));
     if (status == FCSL_VARS_OK) {
         *fcsl_run_simulated_hardware(loop->run) = *hardware;
         if (!was_armed && loop->hal.paces != FCSL_PACED_BY_SIMULATOR) {

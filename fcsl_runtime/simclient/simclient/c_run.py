@@ -64,6 +64,7 @@ class CVerdict(Structure):
         ("holds", c_uint8),
         *((name, c_uint64) for name in ("evaluated", "exercised", "undefined", "faults")),
         *((name, c_uint64) for name in ("violations", "violated_ticks", "first_tick", "last_tick")),
+        ("forgot_before", c_uint64),
     ]
 
 
@@ -93,6 +94,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_inject_fault": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_inject_health": (c_int, [ptr, c_uint32, c_int, _ERROR]),
+    "fcsl_run_save_bytes": (c_uint32, [ptr]),
     "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_checkpoint_capacity": (c_size_t, [ptr]),

@@ -189,13 +189,15 @@ class Run:
         self._lib.fcsl_run_judge(self.handle(), rows, row_bytes, len(rows) // row_bytes)
 
     def save(self) -> bytes:
-        """The whole machine struct, `machine.size` bytes."""
-        data = ctypes.create_string_buffer(self.machine.size)
-        self._check(self._lib.fcsl_run_save(self.handle(), data, self.machine.size, byref(self._error)))
+        """The whole machine struct, `machine.size` bytes; behind it what the requirements remember."""
+        size = self._lib.fcsl_run_save_bytes(self.handle())
+        data = ctypes.create_string_buffer(size)
+        self._check(self._lib.fcsl_run_save(self.handle(), data, size, byref(self._error)))
         return data.raw
 
     def restore(self, data: bytes) -> None:
-        """Restores the result of `save`, from a machine of the same layout."""
+        """Restores the result of `save`, from a machine of the same layout. With the struct alone, or where it has been saved
+        with other requirements, these begin anew."""
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
 
     def checkpoint(self) -> bytes:

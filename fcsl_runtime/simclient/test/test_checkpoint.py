@@ -167,7 +167,7 @@ def refused(twin: AlgTwin, content: bytes, **options: Any) -> str:
 #: What is changed in a whole checkpoint, and what the refusal says.
 FORGED: list[tuple[Callable[[Parts], dict[str, Any]], str]] = [
     (lambda p: {"magic": b"FCSLCKPU"}, "not a checkpoint"),
-    (lambda p: {"version": 3}, "format version 3, and this program reads version 2"),
+    (lambda p: {"version": 4}, "format version 4, and this program reads versions 2 and 3"),
     (lambda p: {"abi": 2}, f"machine ABI 2, and this program hosts ABI {_ABI}"),
     (lambda p: {"byte_order": 2}, "other byte order"),
     (lambda p: {"name": b"pr\x1b[2Jobe"}, r"machine 'pr?[2Jobe', not of 'probe'"),

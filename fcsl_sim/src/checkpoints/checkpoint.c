@@ -18,7 +18,8 @@
 #include "plant_state.h"
 
 static const char MAGIC[8] = {'F', 'C', 'S', 'L', 'S', 'I', 'M', 'C'};
-enum { VERSION = 1, CRC_BYTES = 4 };
+/* In the second version a companion has the size of its machine, and behind the struct what its requirements remember. */
+enum { VERSION = 1, VERSION_WITH_MEMORY = 2, CRC_BYTES = 4 };
 enum { AT_VERSION = 8, AT_BYTES = 16, AT_MACHINE = 24, AT_PLANT = 32, AT_LAYOUT = 40, HEAD_BYTES = 48 };
 
 /* ---- layout ---------------------------------------------------------------------------------------------------------- */
@@ -116,7 +117,7 @@ size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes)
     const size_t plant = fcsl_plant_state_bytes(sim);
     const size_t all = HEAD_BYTES + machine + plant + CRC_BYTES;
     memcpy(out, MAGIC, sizeof MAGIC);
-    fcsl_put_u32(out + AT_VERSION, VERSION);
+    fcsl_put_u32(out + AT_VERSION, sim->companion_count > 0 ? VERSION_WITH_MEMORY : VERSION);
     fcsl_put_u32(out + AT_VERSION + 4, 0);
     fcsl_put_u64(out + AT_BYTES, all);
     fcsl_put_u64(out + AT_MACHINE, machine);
@@ -137,9 +138,10 @@ static int check_head(const fcsl_sim_t *sim, const uint8_t *in, size_t size, fcs
     if (size < HEAD_BYTES + CRC_BYTES || fcsl_get_u64(in + AT_BYTES) != size) {
         return fcsl_fail(error, "cut short, or longer than it says");
     }
-    if (fcsl_get_u32(in + AT_VERSION) != VERSION) {
-        return fcsl_fail(error, "a checkpoint of format version %u, and this program reads version %d",
-                         fcsl_get_u32(in + AT_VERSION), VERSION);
+    const uint32_t version = fcsl_get_u32(in + AT_VERSION);
+    if (version != VERSION && version != VERSION_WITH_MEMORY) {
+        return fcsl_fail(error, "a checkpoint of format version %u, and this program reads versions %d and %d", version,
+                         VERSION, VERSION_WITH_MEMORY);
     }
     if (fcsl_get_u32(in + size - CRC_BYTES) != fcsl_mcap_crc32(in, size - CRC_BYTES)) {
         return fcsl_fail(error, "damaged: its CRC-32 is wrong");
@@ -147,9 +149,8 @@ static int check_head(const fcsl_sim_t *sim, const uint8_t *in, size_t size, fcs
     if (fcsl_get_u64(in + AT_LAYOUT) != layout_of(sim)) {
         return fcsl_fail(error, "of another simulation: its models, their fields, rates or integrators differ");
     }
-    const uint64_t plant = fcsl_plant_state_bytes(sim);
-    if (fcsl_get_u64(in + AT_PLANT) != plant ||
-        fcsl_get_u64(in + AT_MACHINE) != size - HEAD_BYTES - plant - CRC_BYTES) {
+    const uint64_t parts = size - HEAD_BYTES - CRC_BYTES;
+    if (fcsl_get_u64(in + AT_PLANT) > parts || fcsl_get_u64(in + AT_MACHINE) != parts - fcsl_get_u64(in + AT_PLANT)) {
         return fcsl_fail(error, "damaged: the sizes of its parts are wrong");
     }
     return 0;
@@ -274,10 +275,11 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
     }
     const size_t machine = (size_t)fcsl_get_u64(in + AT_MACHINE);
     fcsl_plant_state_save(sim, sim->before);
-    const int taken = fcsl_plant_state_restore(sim, in + HEAD_BYTES + machine) == 0;
+    const int taken = fcsl_plant_state_restore(sim, in + HEAD_BYTES + machine, (size_t)fcsl_get_u64(in + AT_PLANT),
+                                               fcsl_get_u32(in + AT_VERSION) == VERSION) == 0;
     const int possible = taken && is_possible(sim, tick);
     if (!possible || fcsl_run_restore_checkpoint(sim->run, in + HEAD_BYTES, machine, 0, error)) {
-        (void)fcsl_plant_state_restore(sim, sim->before);
+        (void)fcsl_plant_state_restore(sim, sim->before, fcsl_plant_state_bytes(sim), 0);
         return possible ? -1 : fcsl_fail(error, "damaged: its plant is at no instant of this simulation");
     }
     sim->failed = 0;

@@ -17,13 +17,18 @@ typedef struct {
     direction_t direction;
     uint8_t *at;
     size_t bytes;
-    int failed; /* a machine has refused what it got */
+    size_t end;      /* of what is restored */
+    int structs_alone; /* the machines of companions have no memory of requirements: format version 1 of checkpoints */
+    int failed; /* a machine has refused what it got, or there was too little */
 } walk_t;
 
 static void part(walk_t *walk, void *data, size_t size)
 {
     if (walk->direction == SAVE) {
         memcpy(walk->at + walk->bytes, data, size);
+    } else if (walk->direction == RESTORE && walk->end - walk->bytes < size) {
+        walk->failed = 1;
+        return;
     } else if (walk->direction == RESTORE) {
         memcpy(data, walk->at + walk->bytes, size);
     }
@@ -50,7 +55,7 @@ static void walk_link(walk_t *walk, fcsl_sim_t *sim)
     }
     if (walk->direction == SAVE) {
         fcsl_sim_link_save(sim->link, walk->at + walk->bytes);
-    } else if (walk->direction == RESTORE) {
+    } else if (walk->direction == RESTORE && !walk->failed) {
         fcsl_sim_link_restore(sim->link, walk->at + walk->bytes);
     }
     walk->bytes += fcsl_sim_link_bytes(sim->link);
@@ -74,15 +79,20 @@ static void walk_companion(walk_t *walk, fcsl_companion_t *companion)
     walk_sensors(walk, companion->sensors, companion->sensor_count);
     part(walk, companion->delay.slots, fcsl_delay_bytes(&companion->delay));
     part(walk, fcsl_run_simulated_hardware(companion->run), sizeof(fcsl_hw_sim_t));
+    uint32_t saved = walk->structs_alone ? size : fcsl_run_save_bytes(companion->run);
+    if (!walk->structs_alone) {
+        part(walk, &saved, sizeof saved);
+    }
+    fcsl_error_t error;
     if (walk->direction == SAVE) {
-        memcpy(walk->at + walk->bytes, fcsl_run_data(companion->run), size);
+        (void)fcsl_run_save(companion->run, walk->at + walk->bytes, saved, &error); /* the size is right */
     } else if (walk->direction == RESTORE) {
-        fcsl_error_t error;
-        walk->failed = fcsl_run_restore(companion->run, walk->at + walk->bytes, size, &error) != 0 || walk->failed;
+        walk->failed = walk->failed || walk->end - walk->bytes < saved ||
+                       fcsl_run_restore(companion->run, walk->at + walk->bytes, saved, &error) != 0;
         companion->next_tick_ns = fcsl_grid_time_ns(companion->tick, companion->machine->tick_hz);
         companion->due = 0;
     }
-    walk->bytes += size;
+    walk->bytes += walk->failed ? 0 : saved;
 }
 
 static void walk_all(walk_t *walk, fcsl_sim_t *sim)
@@ -134,10 +144,16 @@ static void pass_events(fcsl_sim_t *sim)
     }
 }
 
-int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes)
+int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes, size_t size, int structs_alone)
 {
-    walk_t walk = {.direction = RESTORE, .at = (uint8_t *)(uintptr_t)bytes}; /* reads only */
+    walk_t walk = {.direction = RESTORE,
+                   .at = (uint8_t *)(uintptr_t)bytes, /* reads only */
+                   .end = size,
+                   .structs_alone = structs_alone};
     walk_all(&walk, sim);
+    if (walk.failed || walk.bytes != size) {
+        return -1;
+    }
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         fcsl_instance_state_t *instance = &sim->plant.instances[i];
         instance->next_update_ns =
@@ -151,5 +167,5 @@ int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes)
     fcsl_sim_refill_queue(sim);
     fcsl_actuators_update(sim);
     fcsl_sim_pace_anew(sim);
-    return walk.failed ? -1 : 0;
+    return 0;
 }

@@ -10,7 +10,8 @@
 
 size_t fcsl_plant_state_bytes(const fcsl_sim_t *sim);
 void fcsl_plant_state_save(const fcsl_sim_t *sim, void *bytes);
-/* Returns 0, or -1: a machine has refused its part, and the simulation is of no use until another one is restored. */
-int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes);
+/* `structs_alone`: without what the requirements of companions remember, as format version 1 of checkpoints is. Returns 0, or -1:
+ * the size is another one, or a machine has refused its part, and the simulation is of no use until another one is restored. */
+int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes, size_t size, int structs_alone);
 
 #endif /* FCSL_SIM_PLANT_STATE_H */

@@ -14,7 +14,7 @@
 
 struct fcsl_sim_snapshot {
     int is; /* a snapshot was saved */
-    uint8_t *machine;
+    uint8_t *machine; /* as fcsl_run_save gives it */
     uint8_t *plant;
     fcsl_hw_sim_t hardware;
     uint64_t tick;
@@ -26,7 +26,7 @@ fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim)
     if (!snapshot) {
         return NULL;
     }
-    snapshot->machine = malloc(sim->machine->size);
+    snapshot->machine = malloc(fcsl_run_save_bytes(sim->run));
     snapshot->plant = malloc(fcsl_plant_state_bytes(sim));
     if (!snapshot->machine || !snapshot->plant) {
         fcsl_sim_snapshot_free(snapshot);
@@ -46,7 +46,8 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot)
 
 void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot)
 {
-    memcpy(snapshot->machine, fcsl_run_data(sim->run), sim->machine->size);
+    fcsl_error_t unused; /* the size is right */
+    (void)fcsl_run_save(sim->run, snapshot->machine, fcsl_run_save_bytes(sim->run), &unused);
     fcsl_plant_state_save(sim, snapshot->plant);
     snapshot->hardware = *fcsl_run_simulated_hardware(sim->run);
     snapshot->tick = sim->tick;
@@ -96,10 +97,10 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
                               const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     if (!is_of_snapshot(sim, snapshot, data, hardware, error) ||
-        fcsl_run_restore(sim->run, snapshot->machine, sim->machine->size, error)) {
+        fcsl_run_restore(sim->run, snapshot->machine, fcsl_run_save_bytes(sim->run), error)) {
         return -1;
     }
     *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
-    sim->failed = fcsl_plant_state_restore(sim, snapshot->plant) != 0;
+    sim->failed = fcsl_plant_state_restore(sim, snapshot->plant, fcsl_plant_state_bytes(sim), 0) != 0;
     return sim->failed ? fcsl_fail(error, "a machine does not take its state") : 0;
 }

@@ -34,9 +34,11 @@ static void save(void *ctx)
     fcsl_sim_snapshot_take(sim, sim->service->snapshot);
 }
 
-static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+static fcsl_vars_status_t restore(void *ctx, const void *data, uint32_t size, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error)
 {
     fcsl_sim_t *sim = ctx;
+    (void)size; /* the machine struct is compared, and the snapshot has the rest */
     return fcsl_sim_snapshot_restore(sim, sim->service->snapshot, data, hardware, error) == 0 ? FCSL_VARS_OK
                                                                                               : FCSL_VARS_REFUSED;
 }

@@ -58,7 +58,9 @@ int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *er
 int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
 /* After its next execute this instance is at least FCSL_DEGRADED or FCSL_FAILED, whatever it says itself. */
 int fcsl_run_inject_health(fcsl_run_t *run, uint32_t instance, fcsl_health_t health, fcsl_error_t *error);
-/* The machine struct alone, with canonical NaNs: `size` must be the machine's size. A checkpoint says of which machine it is. */
+/* The machine struct with canonical NaNs, and what the requirements remember behind it: fcsl_run_save_bytes. `size` may be the
+ * machine's: the struct alone, with which the requirements begin anew. A checkpoint says of which machine it is. */
+uint32_t fcsl_run_save_bytes(const fcsl_run_t *run);
 int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error);
 int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error);
 
@@ -174,7 +176,7 @@ int fcsl_run_feed_series(fcsl_run_t *run, fcsl_series_t *series, uint32_t count,
 typedef enum {
     FCSL_WRITE_SET = 0, /* path: a field; element: its first scalar; data: the scalars */
     FCSL_WRITE_SET_STATE = 1, /* path: the state */
-    FCSL_WRITE_RESTORE = 2, /* data: the machine struct */
+    FCSL_WRITE_RESTORE = 2, /* data: as fcsl_run_restore takes it */
     FCSL_WRITE_CHANNEL = 3, /* path: a sensor channel; data: its sample; age_ticks, stamp_ns: of the sample */
     FCSL_WRITE_OVERRUN = 4, /* path: an instance; injected, or found by the clock in that very tick */
     /* path: a sensor channel, or empty for all; one that precedes the record shows in its checkpoint instead */
@@ -188,8 +190,9 @@ typedef enum {
 
 /* ---- checkpoints ------------------------------------------------------------------------------------------------ */
 
-/* A checkpoint is all that a run needs to go on as if it had never stopped: the machine struct and the simulated hardware,
- * and of which machine, sources, layout and tick they are (docs/guide/recording.md). Its bytes are the content of its file. */
+/* A checkpoint is all that a run needs to go on as if it had never stopped: the machine struct, what the requirements remember,
+ * and the simulated hardware, and of which machine, sources, layout and tick they are (docs/guide/recording.md). Its bytes are
+ * the content of its file. */
 
 /* Bytes of the largest checkpoint of this run. */
 size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run);
@@ -248,6 +251,7 @@ typedef struct {
     uint64_t violated_ticks;
     uint64_t first_tick;
     uint64_t last_tick;
+    uint64_t forgot_before; /* tick of a restore that brought no memory of the requirements: they began anew; 0: none */
 } fcsl_verdict_t;
 
 enum { FCSL_VERDICT_TEXT_MAX = 1280 };

@@ -51,8 +51,9 @@ typedef struct {
     void (*set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes, uint32_t size);
     /* A checkpoint was taken of the run: what the host keeps of this moment. Null: nothing. */
     void (*save)(void *ctx);
-    /* A checkpoint: the machine struct, and what its hw_* builtins reach. The server's thread has checked it. */
-    fcsl_vars_status_t (*restore)(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
+    /* A checkpoint: what fcsl_run_restore takes, and what the machine's hw_* builtins reach. The server's thread has checked it. */
+    fcsl_vars_status_t (*restore)(void *ctx, const void *data, uint32_t size, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error);
     fcsl_vars_status_t (*pause)(void *ctx, int paused, fcsl_error_t *error);
     fcsl_vars_status_t (*tick)(void *ctx, uint64_t count, fcsl_error_t *error); /* publishes every tick */
     /* Both wait for the disk: a host that is not paused answers FCSL_VARS_NOT_PAUSED. */

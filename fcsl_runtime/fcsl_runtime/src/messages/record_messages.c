@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "machine/machine_struct.h"
+#include "machine/monitor_memory.h"
 
 /* Of a message of verdicts: what comes once, and for each requirement beside its texts; with all padding. */
 enum { HEAD_BYTES = 64, ROW_BYTES = 32 };
@@ -27,8 +28,8 @@ size_t fcsl_write_message(const fcsl_write_t *write, fcsl_stamp_t stamp, uint8_t
     return fcsl_cdr_end(&cdr);
 }
 
-size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes,
-                               size_t capacity)
+size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_monitor_t *monitor,
+                               const uint8_t *remembered, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
 {
     fcsl_cdr_t cdr;
     fcsl_tick_message_begin(&cdr, stamp, bytes, capacity);
@@ -36,9 +37,13 @@ size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *dat
     fcsl_cdr_string(&cdr, machine->source_hash);
     fcsl_cdr_string(&cdr, machine->layout_hash);
     fcsl_cdr_string(&cdr, machine->build_hash);
-    uint8_t *copy = fcsl_cdr_reserve_bytes(&cdr, machine->size);
+    const size_t memory_bytes = fcsl_monitor_memory_bytes(monitor);
+    uint8_t *copy = fcsl_cdr_reserve_bytes(&cdr, machine->size + (uint32_t)memory_bytes);
     if (copy != NULL) {
         fcsl_copy_canonical(machine, copy, data);
+    }
+    if (copy != NULL && memory_bytes > 0) {
+        fcsl_monitor_memory_put(monitor, remembered, copy + machine->size);
     }
     return fcsl_cdr_end(&cdr);
 }

@@ -29,9 +29,9 @@ typedef struct {
 
 /* They return the bytes of the message, or 0: it does not fit. */
 size_t fcsl_write_message(const fcsl_write_t *write, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
-/* `data`: the machine struct. */
-size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes,
-                               size_t capacity);
+/* `data`: the machine struct; `remembered`: that of the monitor. Null monitor: nothing of requirements. */
+size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_monitor_t *monitor,
+                               const uint8_t *remembered, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
 /* `rows`: one for each requirement. */
 size_t fcsl_verdicts_message(const fcsl_monitor_t *monitor, const fcsl_verdict_row_t *rows, fcsl_stamp_t stamp,
                              uint8_t *bytes, size_t capacity);

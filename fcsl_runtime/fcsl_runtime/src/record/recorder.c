@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_tick_time.h"
 #include "machine/fault_place.h"
 #include "machine/machine_struct.h"
+#include "machine/monitor_memory.h"
 #include "messages/schema.h"
 #include "recorder_internal.h"
 
@@ -111,7 +112,7 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
 {
     const fcsl_machine_t *machine = recorder->machine;
     const size_t fault_bytes = fcsl_fault_text_bytes(machine);
-    size_t bytes = SCRATCH_BASE_BYTES + machine->size + strlen(views);
+    size_t bytes = SCRATCH_BASE_BYTES + machine->size + fcsl_monitor_memory_bytes(recorder->monitor) + strlen(views);
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         bytes += strlen(machine->instances[i].name) + fault_bytes + 40u;
@@ -226,6 +227,7 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl
     recorder->machine = start->machine;
     recorder->live = start->data;
     recorder->monitor = start->monitor;
+    recorder->remembered = start->remembered;
     fcsl_recorder_set_lossless(recorder, options->lossless);
     if (fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
         fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, start->views, error) != 0 ||

@@ -17,6 +17,7 @@ typedef struct {
     const uint8_t *data; /* the machine struct; it stays where it is */
     const char *views;
     const fcsl_monitor_t *monitor; /* null: no requirements */
+    const uint8_t *remembered;     /* the monitor's struct; it stays where it is */
     fcsl_stamp_t first; /* of the initial checkpoint */
 } fcsl_record_start_t;
 

@@ -30,7 +30,7 @@ enum {
     FCSL_RECORD_TICK,       /* the recorded ranges of the machine struct, one after another */
     FCSL_RECORD_WRITE,      /* fcsl_write_t (its `data` means nothing), then the data */
     FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
-    FCSL_RECORD_CHECKPOINT, /* the machine struct */
+    FCSL_RECORD_CHECKPOINT, /* the machine struct, the monitor's struct */
     FCSL_RECORD_VERDICTS,   /* an fcsl_verdict_row_t for each requirement */
     FCSL_RECORD_MESSAGE     /* + topic: a message as it is, at the record's time */
 };
@@ -39,6 +39,7 @@ struct fcsl_recorder {
     const fcsl_machine_t *machine;
     const uint8_t *live; /* the machine struct of the run */
     const fcsl_monitor_t *monitor; /* null: no requirements */
+    const uint8_t *remembered;     /* the monitor's struct of the run */
 
     /* The thread that owns the run; the writer sees those that do not change. What a tick reads lies together. */
     _Atomic uint64_t ring_full;
@@ -73,7 +74,7 @@ struct fcsl_recorder {
 
 /* Works out what a tick copies: what the shown messages and those on change need. 0, or -1. */
 int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error);
-/* Records the whole machine struct as it is now. */
+/* Records the whole machine struct as it is now, and that of the monitor. */
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
 /* The writer thread: makes messages of the records of the ring until it ends. */
 void *fcsl_recorder_run_writer(void *recorder);

@@ -79,9 +79,13 @@ int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const 
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const uint32_t size = recorder->machine->size;
-    uint8_t *out = claim_tick(recorder, FCSL_RECORD_CHECKPOINT, stamp, size, recorder->write_policy);
+    const uint32_t remembered = recorder->monitor != NULL ? recorder->monitor->machine->size : 0u;
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_CHECKPOINT, stamp, size + remembered, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, recorder->live, size);
+        if (remembered > 0) {
+            memcpy(out + size, recorder->remembered, remembered);
+        }
         fcsl_ring_publish(&recorder->ring);
     }
 }

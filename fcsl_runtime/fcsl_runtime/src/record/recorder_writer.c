@@ -31,9 +31,10 @@ static int put_scratch(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t s
 
 static int put_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
-    return put_scratch(
-        recorder, FCSL_TOPIC_CHECKPOINT, stamp,
-        fcsl_checkpoint_message(recorder->machine, data, stamp, recorder->scratch, recorder->scratch_size));
+    return put_scratch(recorder, FCSL_TOPIC_CHECKPOINT, stamp,
+                       fcsl_checkpoint_message(recorder->machine, data, recorder->monitor,
+                                               data + recorder->machine->size, stamp, recorder->scratch,
+                                               recorder->scratch_size));
 }
 
 static int put_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)

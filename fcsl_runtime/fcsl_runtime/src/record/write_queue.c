@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_tick_time.h"
+#include "machine/monitor_memory.h"
 
 /* Of a message, besides data and names; and of the ring, of which an entry may take a half. */
 enum { HEAD_BYTES = 512, RING_BYTES_MIN = 1 << 20, RING_MESSAGES = 4 };
@@ -20,7 +21,7 @@ typedef struct {
 /* ---- the thread that owns the run --------------------------------------------------------------------------------- */
 
 /* That of a checkpoint or of a restore, or of a write with the longest name. */
-static size_t longest_message(const fcsl_machine_t *machine)
+static size_t longest_message(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor)
 {
     size_t longest = strlen(machine->name);
     for (uint32_t i = 0; i < machine->field_count; i++) {
@@ -35,17 +36,17 @@ static size_t longest_message(const fcsl_machine_t *machine)
         const size_t length = strlen(machine->channels[i].name);
         longest = length > longest ? length : longest;
     }
-    return HEAD_BYTES + longest + machine->size;
+    return HEAD_BYTES + longest + machine->size + fcsl_monitor_memory_bytes(monitor);
 }
 
-fcsl_write_queue_t *fcsl_write_queue_open(const fcsl_machine_t *machine)
+fcsl_write_queue_t *fcsl_write_queue_open(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor)
 {
     fcsl_write_queue_t *queue = calloc(1, sizeof *queue);
     if (queue == NULL) {
         return NULL;
     }
     queue->machine = machine;
-    queue->capacity = longest_message(machine);
+    queue->capacity = longest_message(machine, monitor);
     const size_t ring = RING_MESSAGES * queue->capacity;
     if (fcsl_ring_open(&queue->ring, ring > RING_BYTES_MIN ? ring : RING_BYTES_MIN) != 0) {
         free(queue);
@@ -135,5 +136,5 @@ void fcsl_write_queue_skip(fcsl_write_queue_t *queue)
 size_t fcsl_write_queue_checkpoint(const fcsl_write_queue_t *queue, const void *data, uint64_t tick, uint8_t *bytes,
                                    size_t capacity)
 {
-    return fcsl_checkpoint_message(queue->machine, data, stamp_of(queue, tick), bytes, capacity);
+    return fcsl_checkpoint_message(queue->machine, data, NULL, NULL, stamp_of(queue, tick), bytes, capacity);
 }

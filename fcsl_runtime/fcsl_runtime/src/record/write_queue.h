@@ -21,7 +21,7 @@ struct fcsl_write_queue {
 };
 
 /* Null: out of memory. */
-fcsl_write_queue_t *fcsl_write_queue_open(const fcsl_machine_t *machine);
+fcsl_write_queue_t *fcsl_write_queue_open(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor);
 /* What fcsl_run_next_write returns. */
 uint64_t fcsl_write_queue_next_write(fcsl_write_queue_t *queue);
 

@@ -9,11 +9,14 @@
 
 #include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_scalar.h"
+#include "machine/monitor_memory.h"
 #include "run_internal.h"
 
 static const char MAGIC[8] = {'F', 'C', 'S', 'L', 'C', 'K', 'P', 'T'};
 
-enum { VERSION = 2, LITTLE_ENDIAN_STRUCT = 1, BIG_ENDIAN_STRUCT = 2 };
+/* The second one has the memory of requirements behind the machine struct. */
+enum { VERSION = 2, VERSION_WITH_MEMORY = 3 };
+enum { LITTLE_ENDIAN_STRUCT = 1, BIG_ENDIAN_STRUCT = 2 };
 
 /* Offsets of the head, and sizes. */
 enum {
@@ -30,7 +33,7 @@ enum {
     AT_LAYOUT = 120,
     AT_BUILD = 184,
     HEAD_BYTES = 248,
-    HASH_BYTES = 64,
+    HASH_BYTES = FCSL_HASH_BYTES,
     NAME_BYTES_MAX = 255,
     ENTRY_BYTES = 16,
     CRC_BYTES = 4
@@ -130,20 +133,14 @@ void fcsl_checkpoint_hardware(const fcsl_checkpoint_t *checkpoint, fcsl_hw_sim_t
 
 /* ---- writing ------------------------------------------------------------------------------------------------------- */
 
-static void put_hash(uint8_t *out, const char *hash)
+size_t fcsl_checkpoint_capacity(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor)
 {
-    memset(out, 0, HASH_BYTES);
-    memcpy(out, hash, strnlen(hash, HASH_BYTES));
+    return HEAD_BYTES + NAME_BYTES_MAX + (size_t)machine->size + fcsl_monitor_memory_bytes(monitor) +
+           (size_t)BANKS * FCSL_HW_SIM_COUNT * ENTRY_BYTES + CRC_BYTES;
 }
 
-size_t fcsl_checkpoint_capacity(const fcsl_machine_t *machine)
-{
-    return HEAD_BYTES + NAME_BYTES_MAX + (size_t)machine->size + (size_t)BANKS * FCSL_HW_SIM_COUNT * ENTRY_BYTES +
-           CRC_BYTES;
-}
-
-size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_hw_sim_t *hardware,
-                              uint8_t *out)
+size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_monitor_t *monitor,
+                              const uint8_t *remembered, const fcsl_hw_sim_t *hardware, uint8_t *out)
 {
     const size_t name_bytes = strnlen(machine->name, NAME_BYTES_MAX);
     size_t at = HEAD_BYTES;
@@ -151,11 +148,15 @@ size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data
     at += name_bytes;
     fcsl_copy_canonical(machine, out + at, data);
     at += machine->size;
+    if (monitor != NULL) {
+        fcsl_monitor_memory_put(monitor, remembered, out + at);
+        at += fcsl_monitor_memory_bytes(monitor);
+    }
     const uint32_t entries = put_hardware(hardware, out + at);
     at += (size_t)entries * ENTRY_BYTES;
 
     memcpy(out, MAGIC, sizeof MAGIC);
-    fcsl_put_u32(out + AT_VERSION, VERSION);
+    fcsl_put_u32(out + AT_VERSION, monitor != NULL ? VERSION_WITH_MEMORY : VERSION);
     fcsl_put_u32(out + AT_ABI, FCSL_ABI_VERSION);
     fcsl_put_u64(out + AT_BYTES, at + CRC_BYTES);
     fcsl_put_u64(out + AT_TICK, fcsl_read_u64(data, machine->tick_offset));
@@ -164,9 +165,9 @@ size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data
     fcsl_put_u32(out + AT_ENTRIES, entries);
     fcsl_put_u32(out + AT_BYTE_ORDER, byte_order());
     fcsl_put_u32(out + AT_NAME_BYTES, (uint32_t)name_bytes);
-    put_hash(out + AT_SOURCE, machine->source_hash);
-    put_hash(out + AT_LAYOUT, machine->layout_hash);
-    put_hash(out + AT_BUILD, machine->build_hash);
+    fcsl_put_hash(out + AT_SOURCE, machine->source_hash);
+    fcsl_put_hash(out + AT_LAYOUT, machine->layout_hash);
+    fcsl_put_hash(out + AT_BUILD, machine->build_hash);
     fcsl_put_u32(out + at, fcsl_mcap_crc32(out, at));
     return at + CRC_BYTES;
 }
@@ -181,13 +182,6 @@ static const char *shown(char out[NAME_BYTES_MAX + 1], const uint8_t *text, size
     }
     out[size] = '\0';
     return out;
-}
-
-static int same_hash(const uint8_t *held, const char *hash)
-{
-    uint8_t here[HASH_BYTES];
-    put_hash(here, hash);
-    return memcmp(held, here, HASH_BYTES) == 0;
 }
 
 /* Of this machine, and of its layout. */
@@ -206,7 +200,8 @@ static int check_machine(const fcsl_machine_t *machine, const uint8_t *bytes, fc
         return fcsl_fail(error, "the checkpoint is of machine '%s', not of '%s'",
                          shown(text, bytes + HEAD_BYTES, name_bytes), machine->name);
     }
-    if (!same_hash(bytes + AT_LAYOUT, machine->layout_hash) || fcsl_get_u32(bytes + AT_STRUCT_BYTES) != machine->size) {
+    if (!fcsl_is_hash(bytes + AT_LAYOUT, machine->layout_hash) ||
+        fcsl_get_u32(bytes + AT_STRUCT_BYTES) != machine->size) {
         return fcsl_fail(error,
                          "the checkpoint is of another layout of machine '%s' (layout_hash %.12s, here %.12s): fields "
                          "were added, removed or changed, so its bytes mean something else here",
@@ -215,15 +210,24 @@ static int check_machine(const fcsl_machine_t *machine, const uint8_t *bytes, fc
     return 0;
 }
 
+/* Bytes of all parts whose sizes the head has: all but the memory of requirements. */
+static uint64_t parts_bytes(const uint8_t *bytes)
+{
+    return HEAD_BYTES + (uint64_t)fcsl_get_u32(bytes + AT_NAME_BYTES) + fcsl_get_u32(bytes + AT_STRUCT_BYTES) +
+           (uint64_t)fcsl_get_u32(bytes + AT_ENTRIES) * ENTRY_BYTES + CRC_BYTES;
+}
+
 /* A whole checkpoint, undamaged, whose parts have the sizes that it says. */
-static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, fcsl_error_t *error)
+static int check_whole(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor, const uint8_t *bytes, size_t size,
+                       fcsl_error_t *error)
 {
     if (size < sizeof MAGIC || memcmp(bytes, MAGIC, sizeof MAGIC) != 0) {
         return fcsl_fail(error, "not a checkpoint: it does not begin with %.8s", MAGIC);
     }
-    if (size >= AT_ABI && fcsl_get_u32(bytes + AT_VERSION) != VERSION) {
-        return fcsl_fail(error, "a checkpoint of format version %" PRIu32 ", and this program reads version %d",
-                         fcsl_get_u32(bytes + AT_VERSION), VERSION);
+    const uint32_t version = size >= AT_ABI ? fcsl_get_u32(bytes + AT_VERSION) : VERSION;
+    if (version != VERSION && version != VERSION_WITH_MEMORY) {
+        return fcsl_fail(error, "a checkpoint of format version %" PRIu32 ", and this program reads versions %d and %d",
+                         version, VERSION, VERSION_WITH_MEMORY);
     }
     if (size < HEAD_BYTES + CRC_BYTES) {
         return fcsl_fail(error, "the checkpoint is cut short: %zu bytes are not even its head", size);
@@ -231,7 +235,7 @@ static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size
     const uint64_t whole = fcsl_get_u64(bytes + AT_BYTES);
     const uint32_t name_bytes = fcsl_get_u32(bytes + AT_NAME_BYTES);
     /* Of a file that no checkpoint of this machine is as long as, only the beginning was read. */
-    if (size < whole && whole > fcsl_checkpoint_capacity(machine) && name_bytes <= NAME_BYTES_MAX &&
+    if (size < whole && whole > fcsl_checkpoint_capacity(machine, monitor) && name_bytes <= NAME_BYTES_MAX &&
         size >= HEAD_BYTES + name_bytes && check_machine(machine, bytes, error) != 0) {
         return -1;
     }
@@ -244,22 +248,21 @@ static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size
     if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_mcap_crc32(bytes, size - CRC_BYTES)) {
         return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
     }
-    const uint64_t parts = HEAD_BYTES + (uint64_t)name_bytes + fcsl_get_u32(bytes + AT_STRUCT_BYTES) +
-                           (uint64_t)fcsl_get_u32(bytes + AT_ENTRIES) * ENTRY_BYTES + CRC_BYTES;
-    if (parts != whole || name_bytes > NAME_BYTES_MAX) {
+    const uint64_t parts = parts_bytes(bytes);
+    if ((version == VERSION ? parts != whole : parts >= whole) || name_bytes > NAME_BYTES_MAX) {
         return fcsl_fail(error, "the checkpoint is damaged: its parts have other sizes than the whole");
     }
     return 0;
 }
 
-int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int ignore_source_hash,
-                           fcsl_checkpoint_t *checkpoint, fcsl_error_t *error)
+int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const fcsl_monitor_t *monitor, const uint8_t *bytes,
+                           size_t size, int ignore_source_hash, fcsl_checkpoint_t *checkpoint, fcsl_error_t *error)
 {
     char text[NAME_BYTES_MAX + 1];
-    if (check_whole(machine, bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
+    if (check_whole(machine, monitor, bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
         return -1;
     }
-    if (!ignore_source_hash && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
+    if (!ignore_source_hash && !fcsl_is_hash(bytes + AT_SOURCE, machine->source_hash)) {
         return fcsl_fail(
             error,
             "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
@@ -268,9 +271,15 @@ int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, 
             machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
     }
     const uint8_t *data = bytes + HEAD_BYTES + fcsl_get_u32(bytes + AT_NAME_BYTES);
+    const size_t memory_bytes = size - (size_t)parts_bytes(bytes);
+    const uint8_t *remembered = NULL;
+    if (fcsl_monitor_memory_find(monitor, data + machine->size, memory_bytes, &remembered, error) != 0) {
+        return -1;
+    }
     *checkpoint = (fcsl_checkpoint_t){.tick = fcsl_get_u64(bytes + AT_TICK),
                                       .data = data,
-                                      .hardware = data + machine->size,
+                                      .size = machine->size + (remembered != NULL ? (uint32_t)memory_bytes : 0u),
+                                      .hardware = data + machine->size + memory_bytes,
                                       .entries = fcsl_get_u32(bytes + AT_ENTRIES)};
     if (checkpoint->tick > TICK_MAX) {
         return fcsl_fail(error, "the checkpoint is damaged: it holds an impossible tick");
@@ -288,19 +297,21 @@ int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, 
 
 size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run)
 {
-    return fcsl_checkpoint_capacity(run->machine);
+    return fcsl_checkpoint_capacity(run->machine, fcsl_run_monitor(run));
 }
 
 size_t fcsl_run_checkpoint(const fcsl_run_t *run, void *bytes)
 {
-    return fcsl_checkpoint_encode(run->machine, run->data, &run->simulated, bytes);
+    return fcsl_checkpoint_encode(run->machine, run->data, fcsl_run_monitor(run), fcsl_run_monitor_data(run),
+                                  &run->simulated, bytes);
 }
 
 int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int ignore_source_hash,
                              uint64_t *tick, fcsl_error_t *error)
 {
     fcsl_checkpoint_t checkpoint;
-    if (fcsl_checkpoint_decode(run->machine, bytes, size, ignore_source_hash, &checkpoint, error) != 0) {
+    if (fcsl_checkpoint_decode(run->machine, fcsl_run_monitor(run), bytes, size, ignore_source_hash, &checkpoint,
+                               error) != 0) {
         return -1;
     }
     *tick = checkpoint.tick;
@@ -311,8 +322,9 @@ int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size,
                                 fcsl_error_t *error)
 {
     fcsl_checkpoint_t checkpoint;
-    if (fcsl_checkpoint_decode(run->machine, bytes, size, ignore_source_hash, &checkpoint, error) != 0 ||
-        fcsl_run_restore(run, checkpoint.data, run->machine->size, error) != 0) {
+    if (fcsl_checkpoint_decode(run->machine, fcsl_run_monitor(run), bytes, size, ignore_source_hash, &checkpoint,
+                               error) != 0 ||
+        fcsl_run_restore(run, checkpoint.data, checkpoint.size, error) != 0) {
         return -1;
     }
     fcsl_checkpoint_hardware(&checkpoint, &run->simulated);

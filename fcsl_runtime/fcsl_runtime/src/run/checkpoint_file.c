@@ -70,7 +70,8 @@ ssize_t fcsl_checkpoint_read(const char *path, int links, uint8_t *bytes, size_t
 
 int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int ignore_source_hash, fcsl_error_t *error)
 {
-    const size_t capacity = fcsl_run_checkpoint_capacity(run) + 1u; /* one more than right, so that longer ones show */
+    const size_t capacity = fcsl_run_checkpoint_capacity(run) + FCSL_OTHER_MEMORY_BYTES +
+                            1u; /* one more than right, so that longer ones show */
     uint8_t *bytes = malloc(capacity);
     if (bytes == NULL) {
         return fcsl_fail(error, "out of memory for a checkpoint");

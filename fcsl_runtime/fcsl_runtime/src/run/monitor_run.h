@@ -40,6 +40,7 @@ typedef struct {
     uint64_t violated_ticks;
     uint64_t first_tick;
     uint64_t last_tick;
+    uint64_t forgot_before;
     uint8_t holds;
     uint8_t asked; /* whether `at_end` was asked for in the last evaluation, which did not fault */
 } fcsl_served_row_t;
@@ -54,6 +55,7 @@ struct fcsl_monitor_run {
     char *paths;
     uint32_t field_count;
     fcsl_verdict_row_t *noted; /* for each requirement: what was recorded last */
+    uint64_t forgot_before; /* the tick of the last restore that brought no memory of the requirements; 0: none */
     int is_noted; /* 0: nothing yet of this recording */
 };
 

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 
 #include "fcsl/fcsl_fp_mode.h"
+#include "machine/monitor_memory.h"
 #include "machine/view.h"
 #include "monitor_run.h"
 
@@ -147,6 +148,11 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     if (run->recorder != NULL) {
         return fcsl_fail(error, "the requirements of a run are chosen before recording begins");
     }
+    uint8_t *staging = realloc(run->staging, fcsl_run_data_bytes(run->machine) + fcsl_monitor_memory_bytes(monitor));
+    if (staging == NULL) {
+        return fcsl_fail(error, "out of memory");
+    }
+    run->staging = staging;
     struct fcsl_monitor_run *made = calloc(1, sizeof *made);
     if (made == NULL) {
         return fcsl_fail(error, "out of memory");
@@ -264,6 +270,7 @@ const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
             .violated_ticks = fcsl_result_count(data, at->violated_ticks),
             .first_tick = fcsl_result_count(data, at->first_tick),
             .last_tick = fcsl_result_count(data, at->last_violated),
+            .forgot_before = made->forgot_before,
             .holds = data[at->holds],
             .asked = fcsl_result_asked(made, data, i),
         };
@@ -287,19 +294,30 @@ void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, f
         .violated_ticks = row.violated_ticks,
         .first_tick = row.first_tick,
         .last_tick = row.last_tick,
+        .forgot_before = row.forgot_before,
     };
     verdict->status = fcsl_verdict_status(verdict->requirement, row.asked, row.holds, row.exercised, row.violations);
 }
 
-void fcsl_monitor_restored(fcsl_run_t *run)
+void fcsl_monitor_restored(fcsl_run_t *run, const uint8_t *remembered)
 {
+    struct fcsl_monitor_run *made = run->monitor;
+    if (made == NULL) {
+        return;
+    }
+    if (remembered != NULL) {
+        memcpy(made->run->data, remembered, made->monitor->machine->size);
+        made->forgot_before = 0;
+        return;
+    }
     const int64_t none = -2; /* comes before no tick: what is remembered is of another flight */
-    for (uint32_t i = 0; run->monitor != NULL && i < run->monitor->monitor->requirement_count; i++) {
-        const uint32_t at = run->monitor->results[i].last_tick;
+    for (uint32_t i = 0; i < made->monitor->requirement_count; i++) {
+        const uint32_t at = made->results[i].last_tick;
         if (at != FCSL_NO_OFFSET) {
-            memcpy(run->monitor->run->data + at, &none, sizeof none);
+            memcpy(made->run->data + at, &none, sizeof none);
         }
     }
+    made->forgot_before = fcsl_run_tick(run);
 }
 
 static const char *times(uint64_t count, const char *one, const char *many)
@@ -314,6 +332,12 @@ static void add_notes(const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT
     if (verdict->undefined > 0 && at < FCSL_VERDICT_TEXT_MAX) {
         (void)snprintf(text + at, FCSL_VERDICT_TEXT_MAX - at, "; undefined, because of a NaN, in %" PRIu64 " %s",
                        verdict->undefined, times(verdict->undefined, "tick", "ticks"));
+    }
+    at = strlen(text);
+    if (verdict->forgot_before > 0 && at < FCSL_VERDICT_TEXT_MAX) {
+        (void)snprintf(text + at, FCSL_VERDICT_TEXT_MAX - at,
+                       "; began anew at tick %" PRIu64 ": the checkpoint has no memory of this requirement",
+                       verdict->forgot_before);
     }
     at = strlen(text);
     if (verdict->faults > 0 && at < FCSL_VERDICT_TEXT_MAX) {

@@ -15,8 +15,9 @@ void fcsl_monitor_record(fcsl_run_t *run);
 void fcsl_monitor_note(fcsl_run_t *run, uint64_t tick);
 /* The monitor of the machine in a loaded library; null: it has no requirements. */
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine);
-/* The struct of the machine was replaced: what the requirements remember is of another flight. */
-void fcsl_monitor_restored(fcsl_run_t *run);
+/* The struct of the machine was replaced. `remembered`: the monitor's of then; null: what the requirements remember is of
+ * another flight, and they begin anew. */
+void fcsl_monitor_restored(fcsl_run_t *run, const uint8_t *remembered);
 void fcsl_monitor_close(fcsl_run_t *run);
 
 #endif /* FCSL_RUN_REQUIREMENTS_H */

@@ -12,6 +12,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "io_replay.h"
+#include "machine/monitor_memory.h"
 #include "requirements.h"
 #include "record/recorder.h"
 #include "run_internal.h"
@@ -39,53 +40,51 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
     return fcsl_tick_time_ns(run->machine->tick_hz, tick);
 }
 
-int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error)
+uint32_t fcsl_run_save_bytes(const fcsl_run_t *run)
 {
-    if (size != run->machine->size) {
-        return fcsl_fail(error, "a checkpoint of machine '%s' has %" PRIu32 " bytes, not %" PRIu32, run->machine->name,
-                         run->machine->size, size);
-    }
-    fcsl_copy_canonical(run->machine, bytes, run->data);
-    return 0;
+    return run->machine->size + (uint32_t)fcsl_monitor_memory_bytes(fcsl_run_monitor(run));
 }
 
-/* A checkpoint comes from outside: what the machine uses as an index or a boolean must be one. */
-static const char *check_checkpoint(const fcsl_machine_t *machine, const uint8_t *bytes)
+int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < machine->field_count; i++) {
-        const fcsl_field_t *field = &machine->fields[i];
-        const int checked = field->type == FCSL_BOOL || field->type >= FCSL_TRANSITION_REQUEST;
-        const uint32_t scalar = fcsl_scalar_size(field->type);
-        for (uint32_t j = 0; checked && j < field->count; j++) {
-            uint8_t value[8] = {0};
-            fcsl_scalars_export(value, bytes + field->offset + (size_t)j * scalar, field->type, 1);
-            if (!fcsl_scalars_valid(machine, value, field->type, 1)) {
-                return field->path;
-            }
-        }
+    const uint32_t own = run->machine->size;
+    if (size != own && size != fcsl_run_save_bytes(run)) {
+        return fcsl_fail(error, "a checkpoint of machine '%s' has %" PRIu32 " bytes, not %" PRIu32, run->machine->name,
+                         own, size);
     }
-    const int32_t state = fcsl_read_i32(bytes, machine->state_offset);
-    const int32_t next = fcsl_read_i32(bytes, machine->next_state_offset);
-    const int states =
-        state >= 0 && (uint32_t)state < machine->state_count && next >= 0 && (uint32_t)next < machine->state_count;
-    return states ? NULL : "machine.state";
+    fcsl_copy_canonical(run->machine, bytes, run->data);
+    if (size != own) {
+        fcsl_monitor_memory_put(fcsl_run_monitor(run), fcsl_run_monitor_data(run), (uint8_t *)bytes + own);
+    }
+    return 0;
 }
 
 int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error)
 {
-    if (size != run->machine->size) {
+    const uint32_t own = run->machine->size;
+    if (size < own) {
         return fcsl_fail(error, "a checkpoint of machine '%s' has %" PRIu32 " bytes, not %" PRIu32, run->machine->name,
-                         run->machine->size, size);
+                         own, size);
+    }
+    const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
+    const uint8_t *remembered = NULL;
+    if (fcsl_monitor_memory_find(monitor, (const uint8_t *)bytes + own, size - own, &remembered, error) != 0) {
+        return -1;
     }
     fcsl_copy_canonical(run->machine, run->staging, bytes);
-    const char *wrong = check_checkpoint(run->machine, run->staging);
+    const char *wrong = fcsl_struct_check(run->machine, run->staging);
     if (wrong != NULL) {
         return fcsl_fail(error, "the checkpoint is damaged: '%s' has an impossible value", wrong);
     }
+    uint32_t noted = own;
+    if (remembered != NULL) {
+        fcsl_monitor_memory_put(monitor, remembered, run->staging + own);
+        noted += (uint32_t)fcsl_monitor_memory_bytes(monitor);
+    }
     /* Recorded first: the write belongs to the tick that would have come. */
-    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_RESTORE, .path = "", .data = run->staging, .size = size});
-    memcpy(run->data, run->staging, size);
-    fcsl_monitor_restored(run);
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_RESTORE, .path = "", .data = run->staging, .size = noted});
+    memcpy(run->data, run->staging, own);
+    fcsl_monitor_restored(run, remembered);
     return 0;
 }
 

@@ -32,7 +32,7 @@ struct fcsl_run {
     fcsl_channel_table_t channels;
     uint8_t *data;
     uint8_t *safe; /* a struct of which the actuators' fields are safe; null: nothing arms the machine */
-    uint8_t *staging; /* the struct's size: a checked copy before it replaces data */
+    uint8_t *staging; /* a checked copy of what replaces data: the struct, the memory of requirements */
     int requires_arming; /* disarmed, until the arm field has been false after a step */
     fcsl_host_t host;
     uint64_t (*clock_ns)(void *ctx); /* null: nothing is timed */

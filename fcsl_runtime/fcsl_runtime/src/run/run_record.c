@@ -16,6 +16,7 @@ int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_
                                        .data = run->data,
                                        .views = fcsl_run_views(run),
                                        .monitor = fcsl_run_monitor(run),
+                                       .remembered = fcsl_run_monitor_data(run),
                                        .first = fcsl_run_stamp(run, fcsl_run_tick(run))};
     fcsl_monitor_record(run);
     run->recorder = fcsl_recorder_open(&start, options, error);
@@ -81,7 +82,7 @@ int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const ui
 fcsl_write_queue_t *fcsl_run_write_queue(fcsl_run_t *run, fcsl_error_t *error)
 {
     if (run->write_queue == NULL) {
-        run->write_queue = fcsl_write_queue_open(run->machine);
+        run->write_queue = fcsl_write_queue_open(run->machine, fcsl_run_monitor(run));
     }
     if (run->write_queue == NULL) {
         (void)fcsl_fail(error, "out of memory for the queue of host writes");

@@ -53,13 +53,13 @@ typedef struct {
     uint32_t bank;  /* of hardware (command_hardware.c) */
     int put;        /* a value into it */
     injection_t injection;
-    uint32_t size; /* bytes of a sample */
+    uint32_t size; /* bytes of a sample, or of what is restored */
     uint32_t age_ticks;
     int64_t stamp_ns;
     uint32_t write_count;
     write_t *writes; /* WRITES_MAX */
-    uint8_t
-        *bytes; /* values of the writes, a machine struct, a sample, or a bag's path and name space, each with its 0 */
+    /* Values of the writes, what is restored, a sample, or a bag's path and name space, each with its 0. */
+    uint8_t *bytes;
     fcsl_hw_sim_t *hardware; /* of save and restore */
     char file[FILE_BYTES]; /* of save, in the folder of checkpoints; "" for none */
 

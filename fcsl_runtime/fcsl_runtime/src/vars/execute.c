@@ -77,7 +77,12 @@ static fcsl_vars_status_t reach_hardware(fcsl_run_t *run, command_t *command)
 /* Only copies: the server's thread makes the checkpoint of it. */
 static fcsl_vars_status_t save(const fcsl_vars_host_t *host, command_t *command)
 {
-    memcpy(command->bytes, fcsl_run_data(host->run), fcsl_run_machine(host->run)->size);
+    const fcsl_machine_t *machine = fcsl_run_machine(host->run);
+    const fcsl_monitor_t *monitor = fcsl_run_monitor(host->run);
+    memcpy(command->bytes, fcsl_run_data(host->run), machine->size);
+    if (monitor != NULL) {
+        memcpy(command->bytes + machine->size, fcsl_run_monitor_data(host->run), monitor->machine->size);
+    }
     *command->hardware = *fcsl_run_simulated_hardware(host->run);
     if (host->save != NULL) {
         host->save(host->ctx);
@@ -94,7 +99,7 @@ static fcsl_vars_status_t act_on_machine(const fcsl_vars_host_t *host, command_t
     case COMMAND_SAVE:
         return save(host, command);
     case COMMAND_RESTORE:
-        return host->restore(host->ctx, command->bytes, command->hardware, &command->error);
+        return host->restore(host->ctx, command->bytes, command->size, command->hardware, &command->error);
     case COMMAND_INJECT:
         return inject(host->run, command);
     case COMMAND_HARDWARE:

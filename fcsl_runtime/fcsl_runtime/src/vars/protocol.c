@@ -399,7 +399,9 @@ int fcsl_protocol_open(protocol_t *protocol)
     const catalog_t *catalog = &protocol->catalog;
     const fcsl_machine_t *machine =
         catalog->machine < catalog->block_count ? catalog->blocks[catalog->machine].machine : NULL;
-    protocol->checkpoint.room = machine != NULL ? fcsl_checkpoint_capacity(machine) + 1u : 1u;
+    const fcsl_monitor_t *monitor = protocol->host->run != NULL ? fcsl_run_monitor(protocol->host->run) : NULL;
+    protocol->checkpoint.room =
+        machine != NULL ? fcsl_checkpoint_capacity(machine, monitor) + FCSL_OTHER_MEMORY_BYTES + 1u : 1u;
     protocol->snapshot = calloc(1, fcsl_history_bytes(protocol->history) + 1u);
     protocol->checkpoint.bytes = malloc(protocol->checkpoint.room);
     protocol->incoming = malloc(protocol->checkpoint.room);

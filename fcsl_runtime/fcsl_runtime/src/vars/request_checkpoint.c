@@ -19,6 +19,11 @@ static const fcsl_machine_t *machine_of(const protocol_t *protocol)
     return protocol->catalog.blocks[protocol->catalog.machine].machine;
 }
 
+static const fcsl_monitor_t *monitor_of(const protocol_t *protocol)
+{
+    return protocol->host->run != NULL ? fcsl_run_monitor(protocol->host->run) : NULL;
+}
+
 /* ---- files --------------------------------------------------------------------------------------------------------- */
 
 static int is_plain(const char *name)
@@ -81,8 +86,9 @@ void fcsl_protocol_complete(protocol_t *protocol)
         return;
     }
     checkpoint_buffer_t *checkpoint = &protocol->checkpoint;
-    checkpoint->size =
-        fcsl_checkpoint_encode(machine_of(protocol), command->bytes, command->hardware, checkpoint->bytes);
+    const fcsl_machine_t *machine = machine_of(protocol);
+    checkpoint->size = fcsl_checkpoint_encode(machine, command->bytes, monitor_of(protocol),
+                                              command->bytes + machine->size, command->hardware, checkpoint->bytes);
     checkpoint->held = checkpoint->size;
     checkpoint->number++;
     if (command->file[0] != '\0') {
@@ -291,12 +297,14 @@ int fcsl_handle_restore(request_t *request)
     }
     fcsl_checkpoint_t checkpoint;
     fcsl_error_t error;
-    if (fcsl_checkpoint_decode(machine, bytes, size, ignore_source_hash, &checkpoint, &error) != 0) {
+    if (fcsl_checkpoint_decode(machine, monitor_of(request->protocol), bytes, size, ignore_source_hash, &checkpoint,
+                               &error) != 0) {
         return fcsl_request_refuse(request, "refused", "", "%s", error.text);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);
     command->block = request->protocol->catalog.machine;
-    memcpy(command->bytes, checkpoint.data, machine->size);
+    memcpy(command->bytes, checkpoint.data, checkpoint.size);
+    command->size = checkpoint.size;
     fcsl_checkpoint_hardware(&checkpoint, command->hardware);
     return 0;
 }

@@ -30,7 +30,8 @@ static int allocate(fcsl_vars_t *vars, const fcsl_vars_block_t *blocks, uint32_t
     protocol_t *protocol = &vars->protocol;
     size_t bytes = fcsl_history_bytes(vars->history);
     vars->sample = malloc(bytes + 1u);
-    /* Either a machine struct, or the values of a set: every scalar of it has a token. */
+    /* Either a machine struct with the memory of its requirements, or the values of a set: every scalar of it has a token. */
+    bytes += vars->host.run != NULL ? fcsl_run_save_bytes(vars->host.run) : 0u;
     bytes = bytes > 8u * TOKENS_MAX ? bytes : 8u * TOKENS_MAX;
     protocol->history = vars->history;
     protocol->host = &vars->host;

@@ -87,7 +87,7 @@ def parameter_notes(recorded: bytes, run: Run) -> list[str]:
     Raises BagError if its size is not that of the machine.
     """
     machine = run.machine
-    if len(recorded) != machine.size:
+    if len(recorded) < machine.size:
         raise BagError(f"the recorded checkpoint has {len(recorded)} bytes, machine `{machine.name}` {machine.size}")
     differing = []
     for field in machine.fields.values():

@@ -195,7 +195,7 @@ class AlgTwin(Twin):
 
     def _save(self) -> bytes:
         with self._lock:
-            return self._run.save()
+            return self._run.save()[: self.machine.size]
 
     def _restore(self, data: bytes) -> None:
         with self._lock:

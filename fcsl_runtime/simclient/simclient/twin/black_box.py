@@ -44,6 +44,7 @@ class BlackBox:
         self._twin, self._again = twin, again
         self._source: Callable[[], AbstractContextManager[Twin]] = lambda: nullcontext(twin)
         self._verdicts: list[Verdict] | None = None  # once the twin is closed
+        self._before: dict[str, Verdict] = {}  # of a restore
         #: Message about missing ticks; empty if all were recorded.
         self.missing = ""
         self._open()
@@ -80,14 +81,19 @@ class BlackBox:
     def machine(self) -> str:
         return self._twin.machine.name
 
+    def restoring(self) -> None:
+        """A checkpoint puts back what the requirements count; `verdicts` forgets none that was violated or exercised."""
+        self._before = {verdict.id: verdict for verdict in self.verdicts()}
+
     def verdicts(self) -> list[Verdict]:
         """On the machine's requirements; [] of a flight program, whose end says them."""
-        if self._verdicts is None:
-            try:
-                return self._twin._verdicts()
-            except TwinError:
-                return []
-        return self._verdicts
+        if self._verdicts is not None:
+            return self._verdicts
+        try:
+            found = self._twin._verdicts()
+        except TwinError:
+            return []
+        return [_worse(self._before.get(verdict.id, verdict), verdict) for verdict in found]
 
     def rows(self) -> int:
         """Ticks recorded since the beginning."""
@@ -152,6 +158,11 @@ class BlackBox:
                     player._do(what, *arguments)
             step_to(first + len(data) // self._twin.machine.size)
             player.stop_recording()
+
+
+def _worse(before: Verdict, now: Verdict) -> Verdict:
+    """The one that was violated, or the one that was exercised."""
+    return before if not now.violations and (before.violations or now.status == "not exercised") else now
 
 
 class _Kept:

@@ -276,6 +276,8 @@ class Twin(TwinFaults):
         """
         if not isinstance(checkpoint, bytes | bytearray):
             raise TwinError(f"restore: bytes that save() gave wanted, got {type(checkpoint).__name__}")
+        if self._box is not None:
+            self._box.restoring()
         self._do("restore_checkpoint", bytes(checkpoint), ignore_source_hash)
 
     def save_file(self, path: str | Path) -> None:

@@ -21,11 +21,11 @@ typedef struct {
 
 static hosted_t hosted;
 
-static fcsl_vars_status_t hosted_restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware,
+static fcsl_vars_status_t hosted_restore(void *ctx, const void *data, uint32_t size, const fcsl_hw_sim_t *hardware,
                                          fcsl_error_t *error)
 {
     (void)ctx;
-    if (fcsl_run_restore(hosted.run, data, fcsl_machines[0]->size, error) != 0) {
+    if (fcsl_run_restore(hosted.run, data, size, error) != 0) {
         return FCSL_VARS_REFUSED;
     }
     *fcsl_run_simulated_hardware(hosted.run) = *hardware;
