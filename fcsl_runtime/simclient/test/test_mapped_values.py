@@ -48,7 +48,8 @@ REQUIREMENTS: list[dict[str, Any]] = [
     },
     {"id": "SILENT", "text": "The IMU is silent nowhere.", "never": "imu.outputs.health == 'failed'"},
     {"id": "HIGH", "text": "It ends high.", "at_end": "level.outputs.height == 7.0 and mode.outputs.number == 3"},
-    {"id": "LOST", "text": "No fault.", "then": "imu.outputs.gyro[0] < 99.0 and imu.counters.faults < 1"},
+    {"id": "LOST", "text": "No fault.", "then": "imu.outputs.gyro[0] < 99.0 and imu.counters.overruns < 1"},
+    {"id": "RUN", "text": "After runs.", "then": "imu.outputs.gyro[0] < 99.0", "clock": "imu"},
 ]
 
 
@@ -74,8 +75,9 @@ def test_values_are_unknown_before_a_message_and_when_it_is_old(bag: Path, capfd
         "AGAIN met, exercised in 25 ticks (undecided in 4 ticks)",  # 10 to 25, 40 to 48
         "SILENT violated 1 time, first at tick 26 (0.26 s), last at tick 29: The IMU is silent nowhere.",
         "HIGH met, exercised in 44 ticks (undecided in 5 ticks)",
-        "LOST undecided: the map has no `imu.counters.faults`",
-        "2 of 5 met in 49 ticks",
+        "LOST undecided: the map has no `imu.counters.overruns`",
+        "RUN undecided: the map has no `machine.state`, which a `clock` needs",
+        "2 of 6 met in 49 ticks",
     ]
 
 

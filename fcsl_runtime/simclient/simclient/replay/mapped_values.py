@@ -164,7 +164,8 @@ class _MappedValues:
             return Column(ticks, values.reshape(len(values), -1)[chosen, part.element])
         if name.endswith(".outputs.health"):
             return self._health(name.removesuffix("health"))
-        return f"the map has no `{path}`"
+        of_clock = path == STATE or path.endswith(".counters.faults")
+        return f"the map has no `{path}`" + (", which a `clock` needs" if of_clock else "")
 
     def _health(self, prefix: str) -> Column:
         """As of an instance of a machine with channels: failed while it lacks one of its values, from when it first had all."""

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-
-from fcsl_compiler.api.requirements import RequirementPlaces, requirement_places
+from typing import TYPE_CHECKING
 
 from ..errors import TwinError
 from ..machine_build import build_config
 from ..run import open_run
 from .evidence import Proof, Test, read_campaign, read_coverage, read_proofs, read_tests
+
+if TYPE_CHECKING:
+    from fcsl_compiler.api.requirements import RequirementPlaces
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Row:
 
 def matrix(config: str, files: Files) -> list[Row]:
     """A row for each requirement of the machine, those with gaps first. Raises TwinError."""
+    from fcsl_compiler.api.requirements import requirement_places  # here: it imports the compiler
+
     with closing(open_run(*build_config(config))) as run:
         machine, source_hash, verdicts = run.machine.name, run.machine.source_hash, run.verdicts()
     if not verdicts:
