@@ -126,7 +126,7 @@ def _known(ticks: Array, columns: Sequence[Column | str]) -> tuple[Array, str]:
         if isinstance(column, str):
             return ticks[:0], column
         if not np.array_equal(column.ticks, ticks):
-            ticks = np.intersect1d(ticks, column.ticks, assume_unique=True)
+            ticks = ticks[np.isin(ticks, column.ticks, assume_unique=True)]
     return ticks, ""
 
 
