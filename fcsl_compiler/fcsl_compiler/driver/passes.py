@@ -100,7 +100,8 @@ def _check(c: Compilation) -> None:
         c.machine = check_machine(c.parsed, c.sink)
     if c.parsed is not None and c.machine is not None:
         own = read_requirements(c.parsed, c.machine, None, c.sink)
-        check_effects(own, c.machine, _guards(c.parsed), c.sink)
+        if not c.sink.failed:
+            check_effects(own, c.machine, _guards(c.parsed), c.sink)
         c.requirements = own
         if c.requirements_file is not None:
             c.requirements = read_requirements(c.parsed, c.machine, c.requirements_file, c.sink)
@@ -133,6 +134,7 @@ def _schedule(c: Compilation) -> None:
             c.requirements = subset_of(c.requirements, c.machine)
     if c.machine is not None and not c.sink.failed:
         c.machine = with_effects(c.machine, c.effects)
+        check_collisions(c.machine, c.sink)
 
 
 def _lower(c: Compilation) -> None:

@@ -124,6 +124,8 @@ class Generator:
             found["clock"] = "slow"
         if self.random.random() < 0.25:
             found["stale"] = "hold"
+        if kind != "at_end" and self.random.random() < 0.25:
+            found["effect"] = {"degrade": "src"}  # no formula reads this health
         return found
 
 

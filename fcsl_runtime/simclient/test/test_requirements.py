@@ -128,9 +128,6 @@ COUNTS = ("holds", "evaluated", "exercised", "undefined", "violations", "violate
 def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -> None:
     generator = Generator(seed, TICK_HZ)
     requirements = [generator.requirement(f"R-{i}") for i in range(60)]
-    for requirement in requirements[::4]:
-        if "at_end" not in requirement:
-            requirement["effect"] = {"degrade": "src"}
     path = machine(tmp_path, [written(requirement) for requirement in requirements])
     opened: list[tuple[str, Any]] = [("C", AlgTwin.from_config(path)), ("CPython", PyTwin.from_config(path))]
     if seed == 0:
