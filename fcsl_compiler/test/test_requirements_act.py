@@ -14,13 +14,18 @@ from fcsl_test_tables import PUPPET, kind, puppet_machine, run_table
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.coverage.instrument import instrument
 from fcsl_compiler.driver.passes import Compilation, compile_machine
+from fcsl_compiler.driver.record import SUFFIX, StaleBuild, check_record, write_record
 from fcsl_compiler.emit.field_table import field_table, layout_hash, source_hash
 from fcsl_compiler.model.machine import Machine
 
 __all__ = ["kind"]
 
 SLOW = {"id": "R-1", "text": "The value is small.", "then": "one.inputs.divisor < 2", "effect": {"fail": "two"}}
-GUARD = {"id": "R-2", "text": "It is not large.", "never": "one.inputs.divisor > 2"}
+GUARD = {
+    "id": "R-2",
+    "text": "It is not large.",
+    "never": "one.inputs.divisor * 3000000000000000000 > 8000000000000000000",
+}
 TO_C = {"from": "A", "to": "C", "requirement": "R-2", "priority": 9}
 
 
@@ -33,9 +38,11 @@ def test_a_violation_fails_its_instance_and_takes_a_transition(tmp_path: Path) -
         ({}, ["A", "A", "nominal", "nominal"]),
         ({"one.inputs.divisor": 2}, ["A", "A", "failed", "nominal"]),
         ({"one.inputs.divisor": 1}, ["A", "A", "nominal", "nominal"]),
+        ({"one.inputs.divisor": 4}, ["A", "A", "failed", "failed"]),  # beyond 64 bits: it does not act
         ({"one.inputs.divisor": 3}, ["A", "C", "failed", "degraded"]),
+        *[({}, ["C", "C", "failed", "nominal"])] * 2,
+        ({"one.inputs.divisor": 1}, ["C", "C", "failed", "nominal"]),
         ({}, ["C", "C", "failed", "nominal"]),
-        ({"one.inputs.divisor": 0}, ["C", "C", "failed", "nominal"]),
         ({}, ["C", "C", "nominal", "nominal"]),
     ]
     run_table(m, columns, table)
@@ -91,6 +98,17 @@ def test_a_subset_machine_has_those_that_need_nothing_else(tmp_path: Path) -> No
     assert [i.name for i in one.instances] == ["one", "requirements.r_2"] and len(one.edges) == 1
     two = machine(tmp_path, [SLOW, GUARD], config=edges, instances=["two"]).checked
     assert [i.name for i in two.instances] == ["two"] and not two.edges
+
+
+def test_a_library_is_older_than_the_file_of_its_requirements(tmp_path: Path) -> None:
+    own, library = tmp_path / "own.json", tmp_path / "libcraft.so"
+    own.write_text(json.dumps({"requirements": [SLOW]}))
+    compilation = machine(tmp_path, "own.json", until="emit")
+    write_record(Path(f"{library}{SUFFIX}"), [compilation], "fcsl build")
+    check_record(library, "craft", compilation.build_hash)
+    own.write_text(own.read_text() + "\n")
+    with pytest.raises(StaleBuild, match=r"requirements .*own\.json has changed"):
+        check_record(library, "craft", compilation.build_hash)
 
 
 def test_coverage_is_about_the_files_of_the_user(tmp_path: Path) -> None:

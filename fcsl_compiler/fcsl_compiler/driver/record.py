@@ -43,7 +43,7 @@ def _sha256(record: dict[str, Any]) -> str:
 def _machine(c: Compilation) -> dict[str, Any]:
     """Digests of the sources as they were compiled, not of the current files."""
     assert c.parsed is not None
-    sources = [c.parsed.source, *(file.source for file in c.parsed.files)]
+    sources = [c.parsed.source, *(file.source for file in c.parsed.files), *(r.span.source for r in c.effects)]
     files = {str(Path(s.path).resolve()): digest(s.text) for s in sources}
     linked = [(path, path.read_bytes()) for path in c.target.archives]
     linked += [(file.path, file.content) for file in c.c_inputs.files if file.content is not None]
@@ -80,9 +80,7 @@ def check_record(library: Path, machine: str, build_hash: str) -> None:
 
 def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
     """One line for each difference."""
-    lines = [
-        _change("machine" if p == found["config"] else "algorithm", p, h, _text) for p, h in found["files"].items()
-    ]
+    lines = [_change(_kind(p, found["config"]), p, h, _text) for p, h in found["files"].items()]
     lines += [_change("extern", p, h, Path.read_bytes) for p, h in found["externs"].items()]
     try:
         now = toolchain_of(record["compiler"])
@@ -91,6 +89,10 @@ def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
     if now != record["toolchain"]:
         lines.append(f"  C compiler or flags: built with `{record['toolchain']}`, now `{now}`")
     return [line for line in lines if line]
+
+
+def _kind(path: str, config: str) -> str:
+    return "machine" if path == config else "algorithm" if path.endswith(".py") else "requirements"
 
 
 def _text(path: Path) -> str:

@@ -75,9 +75,9 @@ def entry(machine: Machine) -> str:
         writes += [f"{member}.{name} = eva_any_bool();" for name in ("attached", "fresh")]
         writes += [f"{member}.sample_age = eva_any_u32;", f"{member}.stamp_ns = eva_any_i64;"]
     for instance in machine.instances:
-        writes.append(f"machine->i_{instance.name}.counters.inject_fault = (uint8_t)eva_any_below(4u);")
+        writes.append(f"machine->i_{instance.identifier}.counters.inject_fault = (uint8_t)eva_any_below(4u);")
         if instance.max_wcet_us:
-            writes.append(f"machine->i_{instance.name}.counters.inject_overrun = eva_any_bool();")
+            writes.append(f"machine->i_{instance.identifier}.counters.inject_overrun = eva_any_bool();")
     impure = [row for row in rows if "FCSL_FIELD_IMPURE" in row.flags]
     return _PROGRAM.format(
         name=machine.name,
