@@ -5,7 +5,7 @@ from ..ros.composer import Source, composer_conversion
 from ..ros.conversion import ComposerConversion, ConversionError, ReaderConversion, Term
 from ..ros.message_fields import QUATERNION_AXES, VECTOR_AXES, Kind
 from ..ros.reader import Pick, has_stamp, reader_conversion
-from ..ros.rows import scalars_of, select_all
+from ..ros.rows import scalars_of, select_all, unit_of
 from ..ros.standard_messages import STANDARD, Definitions, Member, full_name, short_name
 
 __all__ = [
@@ -28,4 +28,5 @@ __all__ = [
     "scalars_of",
     "select_all",
     "short_name",
+    "unit_of",
 ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from .axes import Matrix
 from .conversion import SIZES, ConversionError, Row, Term
 from .message_fields import FieldError, Kind, Selection, select
-from .standard_messages import Definitions
+from .standard_messages import STANDARD, Definitions
 
 #: The scalar type of each type in messages; of the smaller integers it is i32.
 _SCALARS = {"bool": "bool", "uint32": "u32", "int64": "i64", "uint64": "u64", "float32": "f32", "float64": "f64"}
@@ -99,6 +99,15 @@ def scalars_of(definitions: Definitions, message: str, fields: Sequence[str]) ->
             raise ConversionError(f"the length of `{field}` differs from message to message; take one: {field}[0]")
     types = {_SCALARS.get(piece.type, "i32") for selection in found for piece in selection.pieces}
     return types.pop() if len(types) == 1 else "f64", sum(selection.count for selection in found)
+
+
+def unit_of(message: str, fields: Sequence[str]) -> str:
+    """The unit that the numbers of these fields have in a standard message; "" where it gives none, or several."""
+    try:
+        units = {selection.unit for selection in _each(STANDARD, message, fields)}
+    except (ConversionError, KeyError):
+        return ""
+    return units.pop() if len(units) == 1 else ""
 
 
 def _each(definitions: Definitions, message: str, fields: Sequence[str]) -> list[Selection]:

@@ -35,6 +35,7 @@ MAP = """\
 tick_hz: 100
 values:
   imu.outputs.gyro: {topic: /imu, field: angular_velocity, timeout_ms: 50}
+  imu.outputs.accel: {topic: /imu, field: linear_acceleration}
   level.outputs.height: {topic: /level, field: data, scale: 0.01}
   mode.outputs.number: {topic: /mode, field: data}
 """
@@ -125,14 +126,14 @@ def test_a_robot_has_states(states: Path, capfd: pytest.CaptureFixture[str]) -> 
         (MAP.replace("/mode, field: data", "/joints, field: name"), "`name` is text, not a number"),
         (
             MAP.replace("{topic: /mode, field: data}", "/mode"),
-            "map.yaml:5:24: value `mode.outputs.number`: `field` is m",
+            "map.yaml:6:24: value `mode.outputs.number`: `field` is m",
         ),
         (MAP + "channels: {}", "unknown key `channels`"),
         (
             MAP.replace("mode.outputs.number", "machine.state"),
-            "map.yaml:5:18: value `machine.state`: `states` is missing",
+            "map.yaml:6:18: value `machine.state`: `states` is missing",
         ),
-        (MAP + STATES[STATES.index("  machine") :].replace("/state", "/mode"), ":6:18: `data` of `/mode` is not text"),
+        (MAP + STATES[STATES.index("  machine") :].replace("/state", "/mode"), ":7:18: `data` of `/mode` is not text"),
         (STATES.replace("FLY", "to fly"), "map.yaml:3:18: `machine.state` is no name of a value: `to fly` is not"),
     ],
     ids=lambda text: "map" if "\n" in text else text,
@@ -147,6 +148,7 @@ def test_a_wrong_map_is_refused(chart: str, message: str, bag: Path, capfd: pyte
     [
         ("imu.outputs.giro[0] < 1.0", "there is no field `imu.outputs.giro[0]`"),
         ("imu.outputs.gyro < 1.0", "f.json:1:"),
+        ("imu.outputs.gyro[0] < imu.outputs.accel[0]", "a comparison needs one unit"),
     ],
 )
 def test_a_requirement_that_does_not_fit_the_map_is_refused(

@@ -17,7 +17,7 @@ import numpy as np
 
 from fcsl_compiler.api.build import ToolchainError, build_machine
 from fcsl_compiler.api.diagnostics import DiagnosticError
-from fcsl_compiler.api.ros import ConversionError, scalars_of
+from fcsl_compiler.api.ros import ConversionError, scalars_of, unit_of
 
 from ..bag import Bag
 from ..bag.bag import Array
@@ -93,8 +93,9 @@ def _write_machine(folder: Path, chart: ValueMap, wishes: Sequence[Wish]) -> Pat
     outputs: dict[str, dict[str, str]] = {}
     for one in wishes:
         instance, _, name = one.entry.target.split(".")
-        type_ = one.pick.type if one.pick.count == 1 else f"{one.pick.type}[{one.pick.count}]"
-        outputs.setdefault(instance, {})[name] = type_
+        shape = f"[{one.pick.count}]" if one.pick.count > 1 else ""
+        unit = "" if one.entry.scale or one.entry.offset else unit_of(one.topic.type, one.entry.fields)
+        outputs.setdefault(instance, {})[name] = f"{one.pick.type}{shape} {unit}".rstrip()
     if not outputs:
         outputs["bag"] = {"read": "bool"}  # a machine has an instance
     classes = [
