@@ -78,7 +78,7 @@ class AlgorithmWriter:
     def _read(self, node: Node, element: int) -> str:
         path = str(node.value)
         if node.quantity.shape:
-            path = f"{path[:-1]}, {element}]" if path.endswith("]") else f"{path}[{element}]"
+            path = f"{path[:-1]},{element}]" if path.endswith("]") else f"{path}[{element}]"
         number = sum(name.startswith("value_") for name, _ in self.inputs.values())
         text = self._input(path, f"value_{number}")
         if text not in self.values and text.startswith("self.value_"):

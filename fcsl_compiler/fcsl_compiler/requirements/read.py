@@ -88,7 +88,7 @@ class Signals:
             raise ExpressionError(
                 f"`{path}`: " + (f"`{row.path}` is {shape}" if shape else f"`{row.path}` is one value")
             )
-        return Signal(f"{row.path}{rest}", row, row.shape[len(index) :])
+        return Signal(f"{row.path}{rest.replace(' ', '')}", row, row.shape[len(index) :])
 
     def has(self, path: str) -> bool:
         try:

@@ -28,7 +28,7 @@ KINDS = ("when", "then", "never", "at_end")
 SOURCE = """\
 class Source:
     inputs = {}
-    outputs = {"x": "f64", "y": "f32", "n": "i32", "u": "u64", "b": "bool", "v": "f64[3]"}
+    outputs = {"x": "f64", "y": "f32", "n": "i32", "u": "u64", "b": "bool", "v": "f64[3]", "m": "f64[2][2]"}
     parameters = {}
     state = {}
 
@@ -474,3 +474,15 @@ def test_values_that_are_no_json_are_texts(tmp_path: Path, capsys: pytest.Captur
     assert main([str(tmp_path / "flight"), "--config", str(path), "--json"]) == 1
     found = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(name))
     assert found["requirements"]["LOW"]["first"] == {"src.outputs.x": "nan"}
+
+
+def test_a_row_and_an_element_of_a_matrix(tmp_path: Path) -> None:
+    condition = "norm(src.outputs.m[1]) < 5.0 and src.outputs.m[1, 0] < 3.0"
+    path = machine(tmp_path, [{"id": "ROW", "text": "m is small.", "then": condition, "effect": {"degrade": "src"}}])
+    with AlgTwin.from_config(path) as twin:
+        found = []
+        for row in ([2.0, 4.0], [3.0, 4.0], [3.0, 3.0]):
+            twin.set("src.outputs.m", [[9.0, 9.0], row])
+            twin.tick()
+            found.append((twin.requirements["ROW"].holds, twin.get_value("src.outputs.health")))
+        assert found == [(True, "nominal"), (False, "degraded"), (False, "degraded")]
