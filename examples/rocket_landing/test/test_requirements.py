@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
-from conftest import TICK_HZ
+from conftest import TICK_HZ, tilt
 
 from simclient import SimTwin
 from simclient.requirements import Status
@@ -38,9 +39,12 @@ def test_each_requirement_is_exercised_by_a_flight(fcsl_sim: Callable[..., SimTw
     assert [id_ for id_ in found[0] if all(one[id_] is Status.NOT_EXERCISED for one in found)] == []
 
 
-@pytest.mark.violates("RKT-9")
-def test_a_weak_engine_comes_down_too_fast(fcsl_sim: Callable[..., SimTwin]) -> None:
-    """A requirement can be violated: here by an engine that loses a third of its thrust over the pad."""
-    twin = fcsl_sim("../sim/endless.sim.json", seed=3, events=["28.0 engine.parameters.max_thrust=1200.0"])
+@pytest.mark.violates("RKT-9", "RKT-15")
+def test_a_rocket_that_falls_over_stops_its_engine(fcsl_sim: Callable[..., SimTwin]) -> None:
+    """Two thirds of the thrust are lost over the gate: it hits the pad, and topples. RKT-15 leads to CUT."""
+    twin = fcsl_sim("../sim/endless.sim.json", seed=3, events=["26.0 engine.parameters.max_thrust=600.0"])
     twin.run_until("ground.outputs.touching and machine.state == 'TERMINAL'", timeout_ticks=40 * TICK_HZ)
-    assert twin.requirements["RKT-9"].first["navigation.outputs.velocity[2]"] > 1.2
+    assert twin.requirements["RKT-9"].first["navigation.outputs.velocity[2]"] > 10.0
+    twin.run_until("machine.state == 'CUT'", timeout_ticks=3 * TICK_HZ)
+    assert tilt(np.array(twin.get("earth.outputs.attitude_body_to_ned"))) == pytest.approx(45.0, abs=2.0)
+    assert twin.get("actuators.outputs.throttle") == 0.0
