@@ -149,6 +149,9 @@ class Code:
         if operator == "degrees":
             return f"({parts[0]} * {_DEGREES})"
         if operator == "**":
+            base, exponent = node.parts
+            if base.operator == "field" and exponent.operator == "literal" and exponent.value == 2:
+                return f"({parts[0]} * {parts[0]})"  # the same bits: both are rounded correctly
             return f"pow({parts[0]}, {parts[1]})"
         if operator in ("min", "max"):
             return _nested("least" if operator == "min" else "greatest", parts)
