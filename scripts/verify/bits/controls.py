@@ -58,7 +58,7 @@ def controls(
     for target, future in started:
         found, _ = future.result()
         different = [
-            m for m, hashes in wanted.items() if any(found[m][n] != hashes[n] for n in found[m] if n in hashes)
+            m for m, hashes in found.items() if any(hashes[n] != wanted[m][n] for n in hashes if n in wanted[m])
         ]
         if not different:
             raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")

@@ -21,7 +21,7 @@ from pathlib import Path
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.model.choices import BACKENDS, DEFAULT_BACKEND
 
-from ..shared.cases import EXAMPLES, NUMBERS, OUT, CheckFailed, write_facts
+from ..shared.cases import EXAMPLES, NUMBERS, OUT, SMALL_EXAMPLES, CheckFailed, write_facts
 from ..shared.effort import scaled
 from . import python as bits_python
 from .controls import SEEDED, controls
@@ -149,7 +149,6 @@ def check(seed: int, ticks: int, python_ticks: int, targets: list[Target], pytho
     """Raises CheckFailed, DiagnosticError, ToolchainError."""
     machines = [*EXAMPLES.values(), NUMBERS]
     by_backend = {b: emit_machines(machines, OUT / "bits" / b, b) for b in BACKENDS}
-    sources = by_backend[DEFAULT_BACKEND]
     with ProcessPoolExecutor(2) as processes, ThreadPoolExecutor(2) as threads:
         python = python_runs(processes, seed, min(python_ticks, ticks), python_numbers)
         started = [(t, threads.submit(measure, t, by_backend[t.backend], seed, ticks)) for t in targets]
@@ -166,7 +165,9 @@ def check(seed: int, ticks: int, python_ticks: int, targets: list[Target], pytho
             rows.append({"target": target.name, "flags": target.line, "ticks_per_s": round(speed)})
         print("bits: PyTwin ...", flush=True)
         twins = compare_python(python, wanted, seed)
-        seen = controls(sources, wanted, seed, min(ticks, 10_000), measure, first_difference, threads)
+        # Each control is found in these.
+        few = emit_machines([*SMALL_EXAMPLES.values()], OUT / "bits" / "controls")
+        seen = controls(few, wanted, seed, min(ticks, 10_000), measure, first_difference, threads)
         seen["PyTwin"] = python_difference(SEEDED, EXAMPLES["lander_control"], seed, 100).splitlines()[0]
         print(f"bits: control: PyTwin and that build: {seen['PyTwin']}", flush=True)
     table(rows, twins, wanted)

@@ -12,61 +12,68 @@ from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.reference.externs import externs_of
-from fcsl_compiler.reference.machine import Host, ReferenceMachine
+from fcsl_compiler.reference.machine import ReferenceMachine
 from simclient.descriptor import read_machine
-from simclient.twin.python_run import fault_rows_of, find_descriptor, layout_of
+from simclient.twin.python_run import PythonMachine, fault_rows_of, find_descriptor, layout_of
 
 from ..shared import stimulus
 
+_Init = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
+_Step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
-class PythonMachine:
+
+class StimulatedTwin:
     """One machine JSON in CPython; of its compiled library only the tables are used."""
 
     def __init__(self, config: Path, seed: int):
         built = build_machine(config)
-        descriptor = find_descriptor(built.library, built.name)
-        machine = read_machine(ctypes.pointer(descriptor))
-        layout, places = layout_of(descriptor, machine), fault_rows_of(machine)
+        compiled = find_descriptor(built.library, built.name)
+        tables = read_machine(ctypes.pointer(compiled))
         checked = compile_machine(config, toolchain(), until="schedule").checked
         externs = externs_of(build_externs(config)) if checked.externs else None
-        self.reference = ReferenceMachine(checked, layout, places, externs)
-        self.memory = memoryview(bytearray(descriptor.size))
-        self.stimulus = stimulus.Stimulus(descriptor, seed, self.reference.init, self.reference.force_state)
-        self.host = stimulus.StimulusHost(seed)
+        reference = ReferenceMachine(checked, layout_of(compiled, tables), fault_rows_of(tables), externs)
+        self._machine = PythonMachine(compiled, reference)
+        self._descriptor, self._memory = self._machine.descriptor, ctypes.create_string_buffer(compiled.size)
+        self._seed, self._host, self._stimulus = seed, stimulus.host(seed), stimulus.library()
 
     def run(self, ticks: int) -> Iterator[int]:
-        """The chained hash after every tick."""
-        if self.reference.init(self.memory) != 0:
+        """The chained hash after every tick: what `run` of bits.c does."""
+        init, step = _Init(self._descriptor.init), _Step(self._descriptor.step)
+        if init(ctypes.addressof(self._memory)) != 0:
             raise ValueError("the machine does not begin")
-        self.stimulus.begin(self.memory)
-        host, hash_ = Host(self.host.clock_ns, self.host.hardware), 0
+        hash_, host = 0, ctypes.addressof(self._host) + stimulus.CStimulusHost.host.offset
+        self._stimulus.stimulus_begin(self._descriptor, self._memory)
         for tick in range(ticks):
-            self.host.tick = tick
-            self.stimulus.tick(self.memory, tick)
-            self.reference.step(self.memory, host)
-            hash_ = stimulus.mix(self.stimulus.hash(self.memory, hash_), self.host.written)
+            self._host.tick = tick
+            self._stimulus.stimulus_tick(self._descriptor, self._memory, tick, self._seed)
+            step(ctypes.addressof(self._memory), host)
+            if self._machine.failure is not None:
+                raise self._machine.failure
+            hash_ = self._stimulus.stimulus_hash(self._descriptor, self._memory, hash_)
+            hash_ = self._stimulus.stimulus_mix(hash_, self._host.written)
             yield hash_
 
     def dump(self) -> list[list[str]]:
         """Every field as bits.c prints it."""
-        words = iter(self.stimulus.words(self.memory))
-        rows = [[f.path, str(i), f"{next(words):x}"] for f in self.stimulus.fields for i in range(f.count)]
-        return [*rows, ["hardware.written", "0", f"{self.host.written:x}"]]
+        fields = self._descriptor.fields[: self._descriptor.field_count]
+        word = self._stimulus.stimulus_word
+        rows = [[f.path.decode(), str(i), f"{word(f, self._memory, i):x}"] for f in fields for i in range(f.count)]
+        return [*rows, ["hardware.written", "0", f"{self._host.written:x}"]]
 
 
 def hashes(config: Path, seed: int, ticks: int, marks: tuple[int, ...]) -> dict[int, str]:
     """The hash at each mark that is reached."""
-    return {n: f"{h:x}" for n, h in enumerate(PythonMachine(config, seed).run(ticks), start=1) if n in marks}
+    return {n: f"{h:x}" for n, h in enumerate(StimulatedTwin(config, seed).run(ticks), start=1) if n in marks}
 
 
 def trace(config: Path, seed: int, ticks: int) -> list[list[str]]:
     """The hash after every tick, as bits.c prints it."""
-    return [[config.stem, str(n), f"{h:x}"] for n, h in enumerate(PythonMachine(config, seed).run(ticks), start=1)]
+    return [[config.stem, str(n), f"{h:x}"] for n, h in enumerate(StimulatedTwin(config, seed).run(ticks), start=1)]
 
 
 def dump(config: Path, seed: int, ticks: int) -> list[list[str]]:
     """Every field after the last tick."""
-    machine = PythonMachine(config, seed)
+    machine = StimulatedTwin(config, seed)
     for _ in machine.run(ticks):
         pass
     return machine.dump()

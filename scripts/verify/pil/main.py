@@ -10,7 +10,6 @@ the controller. The control: a controller with the last bit of one constant chan
 from __future__ import annotations
 
 import argparse
-import ctypes
 import hashlib
 import socket
 import subprocess
@@ -63,14 +62,11 @@ class InProcess(Flight):
     def __init__(self, sim: Simulation):
         super().__init__()
         library, handle = simulator_library(), sim.handle()
-        descriptor = library.fcsl_sim_machine(handle).contents
-        address = library.fcsl_sim_machine_data(handle)
-        self._memory = memoryview((ctypes.c_char * descriptor.size).from_address(address)).cast("B")
-        self._stimulus = stimulus.Stimulus(descriptor, 0, lambda _: 0, lambda _, state: None)
+        self._descriptor, self._memory = library.fcsl_sim_machine(handle), library.fcsl_sim_machine_data(handle)
         self._hash = 0
 
     def after_tick(self, sim: Simulation) -> None:
-        self._hash = self._stimulus.hash(self._memory, self._hash)
+        self._hash = stimulus.library().stimulus_hash(self._descriptor, self._memory, self._hash)
         self.fields = f"{self._hash:016x}"
 
 

@@ -2,7 +2,7 @@
  *
  * Deterministic inputs for any machine, found through its descriptor, and a hash over all its fields: what two runs of one
  * machine need to be compared, whoever compiled or interprets it. The same on every target: values are made of a counter by
- * integer arithmetic, and hashed by value. stimulus.py says the same in Python.
+ * integer arithmetic, and hashed by value.
  *
  *     d->init(machine);
  *     stimulus_begin(d, machine);
