@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from fcsl_compiler.base.files import digest
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
 from ..bits.targets import BASE, Target, math_objects
@@ -73,10 +75,16 @@ class Built:
     libraries: dict[str, Path]
 
 
-def _compile(target: Target, flags: Sequence[str], source: Path, made: Path, includes: Sequence[Path]) -> Path:
-    made.parent.mkdir(parents=True, exist_ok=True)
+def _compile(target: Target, flags: Sequence[str], source: Path, includes: Sequence[Path]) -> Path:
+    """An object; one that was made of the same file by the same line before is used again."""
     folders = [f"{'-I' if d.name == 'include' else '-iquote'}{d}" for d in includes]
-    run([*target.compiler, *BASE, *flags, *folders, "-c", source, "-o", made])
+    line = [*target.compiler, *BASE, *flags, *folders, "-c", str(source)]
+    made = FOLDER / "objects" / f"{digest(*line)[:16]}-{source.stem}.o"
+    if not made.exists():
+        made.parent.mkdir(parents=True, exist_ok=True)
+        part = made.with_suffix(f".{threading.get_ident()}.part")  # two targets may need one object at once
+        run([*line, "-o", part])
+        part.replace(made)
     return made
 
 
@@ -95,33 +103,31 @@ class Builder:
         return target.runner[0] if target.runner else "native"
 
     def _make_shared(self, target: Target) -> list[Path]:
-        folder = FOLDER / self._key(target)
         sources = [s for p in _CARRIERS for s in (sorted(p.glob("*.c")) if p.is_dir() else [p])]
         sources += [HERE / "plant.c", *(s for s in sorted(SIMULATOR.glob("*/*.c")) if s.stem in _MOVERS)]
         flags = ("-O1", "-w")
-        objects = [_compile(target, flags, s, folder / f"{s.parent.name}-{s.stem}.o", self.includes) for s in sources]
+        objects = [_compile(target, flags, s, self.includes) for s in sources]
         if not target.own_math:
             return [*objects, math_library()]
-        archive = folder / "libmath.a"
+        archive = FOLDER / self._key(target) / "libmath.a"
+        archive.parent.mkdir()
         run(["llvm-ar-19", "rcs", archive, *math_objects(target)])
         return [*objects, archive]
 
     def build(self, target: Target, patched: Path | None = None) -> Built:
         """The program of a target; `patched` stands in for the simulator's file of its name. Raises CheckFailed."""
         folder = FOLDER / target.name.replace(" ", "_").replace(":", "")
+        folder.mkdir()
         sources = [s for s in sorted(SIMULATOR.glob("*/*.c")) if s.stem not in _MOVERS]
         sources = [patched if patched is not None and s.name == patched.name else s for s in sources]
-        core = [_compile(target, target.flags, s, folder / f"{s.stem}.o", self.includes) for s in sources]
+        core = [_compile(target, target.flags, s, self.includes) for s in sources]
         shared = self._shared[self._key(target)].result()
         libraries = {}
         for name, (source, flags) in MODELS.items():
-            model = _compile(target, (*target.flags, *flags), source, folder / f"model_{name}.o", self.includes)
+            model = _compile(target, (*target.flags, *flags), source, self.includes)
             libraries[name] = self._library(target, [model], shared[-1], folder / f"{name}.so")
         case = self.machine
-        machine = [
-            _compile(target, target.flags, s, folder / f"machine_{s.stem}.o", [*case.includes])
-            for s in (*case.sources, *case.externs)
-        ]
+        machine = [_compile(target, target.flags, s, case.includes) for s in (*case.sources, *case.externs)]
         libraries[MACHINE] = self._library(target, machine, shared[-1], folder / f"{MACHINE}.so")
         program = folder / "plant"
         stubs = self._stubs(target, [*core, *shared[:-1]], folder / "stubs.c")
@@ -139,7 +145,7 @@ class Builder:
         missing = sorted(names[True] - names[False])
         text = [_STUB.format(name=n, ends=int(not n.endswith(("_close", "_free")))) for n in missing]
         source.write_text("\n".join(["#include <stdio.h>\n#include <stdlib.h>\n", *text]))
-        return _compile(target, ("-O1",), source, source.with_suffix(".o"), [])
+        return _compile(target, ("-O1",), source, [])
 
     @staticmethod
     def _library(target: Target, objects: Sequence[Path], math: Path, made: Path) -> Path:
