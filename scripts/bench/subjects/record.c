@@ -20,7 +20,7 @@
 #include <time.h>
 
 /* A burst fits into the ring; in the pause behind it the writer catches up. */
-enum { BURST_TICKS = 4000, PAUSE_NS = 150000000, PACED_TICKS = 2000, PERIOD_NS = 1000000, COUNTED_TICKS = 200 };
+enum { BURST_TICKS = 4000, PAUSE_NS = 150000000, PACED_TICKS = 2000, PERIOD_NS = 1000000, COUNTED_TICKS = 5 };
 
 static fcsl_run_t *open_run(const char *library)
 {
@@ -78,17 +78,18 @@ static void pause_ns(long ns)
     (void)nanosleep(&pause, NULL);
 }
 
-/* The instructions of a tick: medians do not help here, so the mean; a tick of a full quarter of the ring wakes the writer. */
-static double instructions(fcsl_run_t *run)
+/* The instructions of a tick, of COUNTED_TICKS a round: medians do not help here, so the mean; a tick of a full quarter of the ring wakes the writer. */
+static double instructions(fcsl_run_t *run, int rounds)
 {
     fcsl_error_t error;
+    const int ticks = COUNTED_TICKS * rounds;
     uint64_t sum = 0;
-    for (int i = 0; i < COUNTED_TICKS; i++) {
+    for (int i = 0; i < ticks; i++) {
         stepped_arm((uintptr_t)dlsym(RTLD_DEFAULT, "fcsl_run_step"));
         (void)fcsl_run_step(run, 1, &error);
         sum += stepped.all;
     }
-    return (double)sum / COUNTED_TICKS;
+    return (double)sum / ticks;
 }
 
 static void put(const char *name, spread_t of, const char *behind)
@@ -117,8 +118,8 @@ static void time_steps(const char *library, const char *folder, int rounds)
             pause_ns(PERIOD_NS / 2);
         }
     }
-    const double plain = stepped_begin() == 0 ? instructions(runs[0]) : 0;
-    const double recorded = instructions(runs[1]);
+    const double plain = stepped_begin() == 0 ? instructions(runs[0], rounds) : 0;
+    const double recorded = instructions(runs[1], rounds);
     const uint64_t dropped = fcsl_run_record_dropped(runs[1]);
     printf("{");
     put("plain_ns", spread(ns[0], rounds), ", ");

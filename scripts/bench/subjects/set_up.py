@@ -21,7 +21,7 @@ from ..harness.size import sized
 
 #: What says where caches are; the fresh home has none. rustup's toolchains stay: they are a system package's concern.
 CACHES = ("CARGO_HOME", "FCSL_CACHE_DIR", "PIP_CACHE_DIR", "UV_CACHE_DIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
-INSTANCES = tuple(f"stage_{number}" for number in range(9))
+INSTANCES = tuple(f"stage_{number}" for number in range(sized(9, 2)))
 _ALGORITHM = '''class Stage:
     """One of nine instances."""
 
@@ -89,7 +89,7 @@ def edit_times(workspace: Path) -> dict[str, float]:
     write_machine(package, 1.0)
     environment = {n: v for n, v in os.environ.items() if n != "COLCON_DEFAULTS_FILE"}
     times = {"rover_first_s": timed(["colcon", "build"], workspace, environment)[0]}
-    (package / f"{INSTANCES[3]}.py").write_text(_ALGORITHM.replace("OUTPUT", ', "armed": "bool"'))
+    (package / f"{INSTANCES[-1]}.py").write_text(_ALGORITHM.replace("OUTPUT", ', "armed": "bool"'))
     times["rover_output_s"] = timed(["colcon", "build"], workspace, environment)[0]
     write_machine(package, 2.0)
     times["rover_parameter_s"] = timed(["colcon", "build"], workspace, environment)[0]

@@ -42,11 +42,13 @@ from ...peers.linear.numba import attitude_numba, kalman_numba
 HERE = Path(__file__).resolve().parent
 #: The C of others, and what every kernel is called through (kernel.h).
 PEERS = HERE.parents[1] / "peers/linear"
-SIZES = sized((6, 9, 15), (9,))
+SIZES = sized((6, 9, 15), (6,))
 ROUNDS = sized(61, 1)
 #: FCSL's own flags; peers get them with the contraction and the reassociation that they ship with (none).
 PORTABLE = list(FLAGS)
 NATIVE = [*FLAGS, "-march=native"]
+#: A smallest run builds none for this processor alone.
+BUILDS = sized((("", PORTABLE), (", native", NATIVE)), (("", PORTABLE),))
 CXX = [f.replace("c11", "c++17") for f in FLAGS if f != "-ffp-contract=off"]
 #: Beyond this the peers do not compute the same; they sum in other orders.
 MAX_APART = 1e-9
@@ -85,7 +87,7 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
     frozen = _machine(_folder(folder, "frozen"), "filter", "Kalman", source, parameters, True)
     free = _machine(_folder(folder, "free"), "filter", "Kalman", source, parameters, False)
     kernels: dict[str, Path] = {}
-    for label, flags in (("", PORTABLE), (", native", NATIVE)):
+    for label, flags in BUILDS:
         kernels |= {
             f"FCSL{label}": _fcsl(frozen, "kalman", flags),
             f"FCSL, {AT_RUN_TIME['kalman']}{label}": _fcsl(free, "kalman", flags),
@@ -109,7 +111,7 @@ def _attitude(folder: Path, program: Path, rounds: int) -> Figures:
     frozen = _machine(_folder(folder, "frozen"), "control", "Attitude", source, parameters, True)
     free = _machine(_folder(folder, "free"), "control", "Attitude", source, parameters, False)
     kernels: dict[str, Path] = {}
-    for label, flags in (("", PORTABLE), (", native", NATIVE)):
+    for label, flags in BUILDS:
         kernels |= {
             f"FCSL{label}": _fcsl(frozen, "attitude", flags),
             f"FCSL, {AT_RUN_TIME['attitude']}{label}": _fcsl(free, "attitude", flags),
@@ -192,7 +194,7 @@ def _time(
     samples.write_bytes(inputs.tobytes())
     times: Figures = {}
     results: dict[str, Matrix] = {}
-    for group in ([k for k in kernels if "native" not in k], [k for k in kernels if "native" in k]):
+    for group in filter(None, ([k for k in kernels if "native" not in k], [k for k in kernels if "native" in k])):
         command = [str(program), str(samples), str(per_step), str(rounds), *(str(kernels[name]) for name in group)]
         lines = json.loads(_run(command), parse_int=float)  # -0 is a float, too
         for name, line in zip(group, lines, strict=True):
@@ -225,7 +227,7 @@ def _twins(
     inputs = np.ascontiguousarray(np.column_stack(list(columns.values()))[:TWIN_STEPS])
     spent = 0.0
     for machine, own in zip(machines, ("FCSL", f"FCSL, {AT_RUN_TIME[kind]}"), strict=True):
-        compiled = {name: kernels[name] for name in (own, f"{own}, native")}
+        compiled = {name: kernels[name] for name in (f"{own}{label}" for label, _ in BUILDS)}
         _, results = _time(program, inputs, inputs.shape[1], 1, compiled)
         expected, ns = _twin(machine / "bench.json", columns, outputs)
         for name, result in results.items():

@@ -133,18 +133,18 @@ static inline __attribute__((always_inline)) double block_ns(const whole_t *w, i
     return (now_ns() - begun) / BLOCK;
 }
 
-/* Instructions of a candidate in a tick, on average over a block. */
-static double instructions(const whole_t *w, int candidate, uint64_t tick)
+/* Instructions of a candidate in a tick, on average over so many. */
+static double instructions(const whole_t *w, int candidate, uint64_t tick, uint64_t count)
 {
     const uintptr_t targets[] = {(uintptr_t)whole_machine->step, (uintptr_t)whole_connected, (uintptr_t)whole_bodies,
                                  (uintptr_t)by_hand_step};
     uint64_t sum = 0;
-    for (uint64_t k = 0; k < BLOCK; ++k) {
+    for (uint64_t k = 0; k < count; ++k) {
         stepped_arm(targets[candidate]);
         tick_of(w, candidate, tick + k);
         sum += stepped.all;
     }
-    return (double)sum / BLOCK;
+    return (double)sum / (double)count;
 }
 
 /* The machine in ticks spread over its major cycle, from a copy of it. */
@@ -255,7 +255,8 @@ int main(int argc, char **argv)
         return 1;
     }
     for (int c = STEP; c <= BY_HAND; ++c) {
-        printf("\"%s_instructions\": %.2f, ", names[c], instructions(&w, c, tick));
+        printf("\"%s_instructions\": %.2f, ", names[c],
+               instructions(&w, c, tick, rounds < BLOCK ? (uint64_t)rounds : BLOCK));
     }
     printf("\"apart\": %.3g, \"connected_apart\": %.3g, \"state_bytes\": %u, \"by_hand_state_bytes\": %zu}\n", greatest,
            connected, whole_machine->size, by_hand_size);
