@@ -47,7 +47,7 @@ def test_round_trip() -> None:
         TransitionEvent(tick=7, from_state="ASCENT", to_state="COAST", request="START_COAST", instance="ascent"),
         FaultCounters(tick=7, instance=["nav"], faults=[2**63], overruns=[1], fault_place=["nav.py:3:9: …"]),
         Checkpoint(tick=7, machine="lander_control", data=[1, 2, 3]),
-        RequirementVerdicts(tick=7, requirement=["LND-7"], text=["…"], verdict=[1], holds=[False], violations=[3]),
+        RequirementVerdicts(tick=7, requirement=["LND-7"], verdict=[1], holds=[False], values=["…"], violations=[3]),
         HostWrite(tick=7, kind=HostWrite.SET, path="sensors.outputs.pos_z", element=1, data=[0] * 8),
     ]
     for message in messages:

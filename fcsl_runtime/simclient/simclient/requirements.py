@@ -67,12 +67,18 @@ def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
 
 
 def of_stats(stats: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
-    """The verdicts that a flight program counts (`stats` of the variable server), without the values of a violation."""
+    """The verdicts that a flight program counts (`stats` of the variable server)."""
     found = []
     for id_, counts in stats.items():
         ticks = {"first_tick": None, "last_tick": None}
-        found.append(Verdict(id_, **{**ticks, **counts, "status": Status(counts["status"])}))
+        kept = {which: _numbers(counts.get(which, {})) for which in ("first", "last")}
+        found.append(Verdict(id_, **{**ticks, **counts, **kept, "status": Status(counts["status"])}))
     return found
+
+
+def _numbers(values: Mapping[str, Any]) -> dict[str, Any]:
+    """With floats for the texts that JSON has instead of those that are not finite."""
+    return {path: float(v) if v in ("nan", "inf", "-inf") else v for path, v in values.items()}
 
 
 def read_violations(lib: Any, handle: int) -> list[float]:

@@ -90,6 +90,7 @@ def test_rerun_shows_when_a_requirement_was_violated(
     begun = [(one.start_ns / 1e9, "violated") for one in found]
     assert [row for row in lane if row[1]] == begun and len(lane) == len(begun) + sum(one.ended for one in found)
     log = values(rows, "/craft/requirements", "TextLog:text")
-    assert (begun[0][0], "LOW.2 violated: n is small.") in log
+    values_of_it = "src.outputs.b = true, src.outputs.n = 3"
+    assert (begun[0][0], f"LOW.2 violated: n is small. ({values_of_it})") in log
     assert (found[0].end_ns / 1e9, "LOW.2 holds again") in log
     assert views(tmp_path / "run.rrd")["requirements"] == "StateTimeline"

@@ -8,7 +8,6 @@ import math
 import random
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -161,7 +160,7 @@ def test_the_flight_program_has_the_same_verdicts(tmp_path: Path) -> None:
         fly(native, 11, 60)
         fly(process, 11, 60)
         flown, found = native.requirements, process.requirements
-        assert {id_: replace(v, first={}, last={}) for id_, v in flown.items()} == found
+        assert repr(flown) == repr(found)  # NaNs, too
         assert process._client.get_value("requirements.r_3.exercised") == flown["R-3"].exercised
 
 

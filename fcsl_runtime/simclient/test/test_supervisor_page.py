@@ -143,11 +143,11 @@ def test_requirements_are_shown_with_their_verdicts(
         client.tick(3)
         page.run(f"location.hash = '{run['id']}'")
         cells = "[...document.querySelectorAll('#requirements tbody tr')].map((row) => [...row.cells].map((c) => c.innerText))"
-        row = ["LOW-1", "met", "3", "0", "", HOSTILE]
+        row = ["LOW-1", "met", "3", "0", "", "", HOSTILE]
         page.wait(f"JSON.stringify({cells}[0]) === JSON.stringify({json.dumps(row)})")
         client.set({"src.outputs.x": 3.0})
         client.tick()
-        row[1:5] = "violated", "4", "1", "3"
+        row[1:6] = "violated", "4", "1", "3", "src.outputs.x = 3"
         page.wait(f"JSON.stringify({cells}[0]) === JSON.stringify({json.dumps(row)})")
         assert page.run(f"{cells}[1][1]") == "met"
     supervisor.ask("DELETE", f"/runs/{run['id']}")

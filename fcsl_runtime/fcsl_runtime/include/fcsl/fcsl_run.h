@@ -254,7 +254,7 @@ typedef struct {
     uint64_t forgot_before; /* tick of a restore that brought no memory of the requirements: they began anew; 0: none */
 } fcsl_verdict_t;
 
-enum { FCSL_VERDICT_TEXT_MAX = 1280 };
+enum { FCSL_VERDICT_TEXT_MAX = 1280, FCSL_KEPT_LAST = 8 };
 
 /* Those of a library come with it; this gives a run the monitor of another machine that has the same fields. */
 int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_error_t *error);
@@ -272,6 +272,9 @@ const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size);
 const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *count);
 /* `rows`: of fcsl_run_gather_verdicts, or a copy; `index`: of a requirement of the monitor. */
 void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, fcsl_verdict_t *verdict);
+/* The values that a requirement has kept of the first tick that violated it, as fields of the rows with the paths of the machine;
+ * those of the last tick are FCSL_KEPT_LAST bytes behind them. Without a violation they mean nothing. */
+const fcsl_field_t *fcsl_run_kept_values(const fcsl_run_t *run, uint32_t index, uint32_t *count);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
 void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
 /* ---- views ------------------------------------------------------------------------------------------------------- */

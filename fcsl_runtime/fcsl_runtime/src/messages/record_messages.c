@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Writes checkpoints, host writes and verdicts as CDR.
+ * Writes checkpoints and host writes as CDR.
  */
 #include "record_messages.h"
 
@@ -8,9 +8,6 @@
 
 #include "machine/machine_struct.h"
 #include "machine/monitor_memory.h"
-
-/* Of a message of verdicts: what comes once, and for each requirement beside its texts; with all padding. */
-enum { HEAD_BYTES = 64, ROW_BYTES = 32 };
 
 size_t fcsl_write_message(const fcsl_write_t *write, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
 {
@@ -46,42 +43,4 @@ size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *dat
         fcsl_monitor_memory_put(monitor, remembered, copy + machine->size);
     }
     return fcsl_cdr_end(&cdr);
-}
-
-size_t fcsl_verdicts_message(const fcsl_monitor_t *monitor, const fcsl_verdict_row_t *rows, fcsl_stamp_t stamp,
-                             uint8_t *bytes, size_t capacity)
-{
-    const uint32_t count = monitor->requirement_count;
-    fcsl_cdr_t cdr;
-    fcsl_tick_message_begin(&cdr, stamp, bytes, capacity);
-    fcsl_cdr_u32(&cdr, count);
-    for (uint32_t i = 0; i < count; i++) {
-        fcsl_cdr_string(&cdr, monitor->requirements[i].id);
-    }
-    fcsl_cdr_u32(&cdr, count);
-    for (uint32_t i = 0; i < count; i++) {
-        fcsl_cdr_string(&cdr, monitor->requirements[i].text);
-    }
-    fcsl_cdr_u32(&cdr, count);
-    for (uint32_t i = 0; i < count; i++) {
-        fcsl_cdr_u8(&cdr, rows[i].verdict);
-    }
-    fcsl_cdr_u32(&cdr, count);
-    for (uint32_t i = 0; i < count; i++) {
-        fcsl_cdr_u8(&cdr, rows[i].holds);
-    }
-    fcsl_cdr_u32(&cdr, count);
-    for (uint32_t i = 0; i < count; i++) {
-        fcsl_cdr_u64(&cdr, rows[i].violations);
-    }
-    return fcsl_cdr_end(&cdr);
-}
-
-size_t fcsl_verdicts_message_capacity(const fcsl_monitor_t *monitor)
-{
-    size_t bytes = HEAD_BYTES;
-    for (uint32_t i = 0; i < monitor->requirement_count; i++) {
-        bytes += strlen(monitor->requirements[i].id) + strlen(monitor->requirements[i].text) + ROW_BYTES;
-    }
-    return bytes;
 }

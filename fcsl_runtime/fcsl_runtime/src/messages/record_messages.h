@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What reproduces a run, as fcsl_msgs messages: a checkpoint, and what the host did. Recorder and write queue make them.
- * And the verdicts on requirements, which the recorder alone makes.
  */
 #ifndef FCSL_RECORD_MESSAGES_H
 #define FCSL_RECORD_MESSAGES_H
@@ -20,22 +19,10 @@ typedef struct {
     int64_t stamp_ns;
 } fcsl_write_t;
 
-/* A requirement after a tick, as fcsl_msgs/RequirementVerdicts has it. */
-typedef struct {
-    uint64_t violations;
-    uint8_t verdict; /* fcsl_verdict_status_t */
-    uint8_t holds;
-} fcsl_verdict_row_t;
-
-/* They return the bytes of the message, or 0: it does not fit. */
+/* Both return the bytes of the message, or 0: it does not fit. */
 size_t fcsl_write_message(const fcsl_write_t *write, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
 /* `data`: the machine struct; `remembered`: that of the monitor. Null monitor: nothing of requirements. */
 size_t fcsl_checkpoint_message(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_monitor_t *monitor,
                                const uint8_t *remembered, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
-/* `rows`: one for each requirement. */
-size_t fcsl_verdicts_message(const fcsl_monitor_t *monitor, const fcsl_verdict_row_t *rows, fcsl_stamp_t stamp,
-                             uint8_t *bytes, size_t capacity);
-/* At most so many bytes. */
-size_t fcsl_verdicts_message_capacity(const fcsl_monitor_t *monitor);
 
 #endif /* FCSL_RECORD_MESSAGES_H */

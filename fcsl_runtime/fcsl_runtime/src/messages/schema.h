@@ -30,7 +30,7 @@
 #define FCSL_SCHEMA_REQUIREMENT_VERDICTS                                                                               \
     "uint8 MET=0\nuint8 VIOLATED=1\nuint8 NOT_EXERCISED=2\n"                                                           \
     "std_msgs/Header header\nuint64 tick\nstring[] requirement\nstring[] text\nuint8[] verdict\nbool[] holds\n"        \
-    "uint64[] violations\n" FCSL_SCHEMA_HEADER
+    "string[] values\nuint64[] violations\n" FCSL_SCHEMA_HEADER
 
 /* Of other packages. */
 #define FCSL_SCHEMA_CLOCK                                                                                              \

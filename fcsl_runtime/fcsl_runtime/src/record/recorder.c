@@ -96,7 +96,7 @@ static int add_verdict_topic(fcsl_recorder_t *recorder, const char *name_space, 
 {
     char topic[TOPIC_BYTES];
     recorder->own_topics = FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count;
-    if (recorder->monitor == NULL) {
+    if (recorder->verdicts.monitor == NULL) {
         return 0;
     }
     recorder->own_topics++;
@@ -112,7 +112,8 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
 {
     const fcsl_machine_t *machine = recorder->machine;
     const size_t fault_bytes = fcsl_fault_text_bytes(machine);
-    size_t bytes = SCRATCH_BASE_BYTES + machine->size + fcsl_monitor_memory_bytes(recorder->monitor) + strlen(views);
+    size_t bytes =
+        SCRATCH_BASE_BYTES + machine->size + fcsl_monitor_memory_bytes(recorder->verdicts.monitor) + strlen(views);
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         bytes += strlen(machine->instances[i].name) + fault_bytes + 40u;
@@ -121,8 +122,7 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
         const uint32_t size = recorder->shown[i].layout.size;
         largest = size > largest ? size : largest;
     }
-    bytes += recorder->monitor != NULL ? fcsl_verdicts_message_capacity(recorder->monitor) : 0;
-    return bytes + largest;
+    return bytes + largest + fcsl_verdict_message_capacity(&recorder->verdicts);
 }
 
 static int allocate(fcsl_recorder_t *recorder, const char *views, fcsl_error_t *error)
@@ -226,7 +226,7 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl
     }
     recorder->machine = start->machine;
     recorder->live = start->data;
-    recorder->monitor = start->monitor;
+    recorder->verdicts = start->verdicts;
     recorder->remembered = start->remembered;
     fcsl_recorder_set_lossless(recorder, options->lossless);
     if (fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||

@@ -8,6 +8,7 @@
 
 #include "fcsl/fcsl_error.h"
 #include "messages/record_messages.h"
+#include "messages/verdict_message.h"
 
 typedef struct fcsl_recorder fcsl_recorder_t;
 
@@ -16,8 +17,8 @@ typedef struct {
     const fcsl_machine_t *machine;
     const uint8_t *data; /* the machine struct; it stays where it is */
     const char *views;
-    const fcsl_monitor_t *monitor; /* null: no requirements */
-    const uint8_t *remembered;     /* the monitor's struct; it stays where it is */
+    fcsl_verdict_table_t verdicts;
+    const uint8_t *remembered; /* the struct of their monitor; it stays where it is */
     fcsl_stamp_t first; /* of the initial checkpoint */
 } fcsl_record_start_t;
 
@@ -42,8 +43,8 @@ void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const f
 int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
-/* The verdicts after the tick just completed, a row for each requirement. 0, or -1: there was no room. */
-int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_verdict_row_t *rows);
+/* The verdicts after the tick just completed: fcsl_verdict_rows_bytes. 0, or -1: there was no room. */
+int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *rows);
 
 int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
                             fcsl_error_t *error);

@@ -8,6 +8,7 @@
 #include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_bag.h"
 #include "messages/tick_messages.h"
+#include "messages/verdict_message.h"
 #include "ring.h"
 #include "record_topics.h"
 
@@ -31,15 +32,15 @@ enum {
     FCSL_RECORD_WRITE,      /* fcsl_write_t (its `data` means nothing), then the data */
     FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
     FCSL_RECORD_CHECKPOINT, /* the machine struct, the monitor's struct */
-    FCSL_RECORD_VERDICTS,   /* an fcsl_verdict_row_t for each requirement */
+    FCSL_RECORD_VERDICTS,   /* as verdict_message.h has it */
     FCSL_RECORD_MESSAGE     /* + topic: a message as it is, at the record's time */
 };
 
 struct fcsl_recorder {
     const fcsl_machine_t *machine;
     const uint8_t *live; /* the machine struct of the run */
-    const fcsl_monitor_t *monitor; /* null: no requirements */
-    const uint8_t *remembered;     /* the monitor's struct of the run */
+    fcsl_verdict_table_t verdicts;
+    const uint8_t *remembered; /* the monitor's struct of the run */
 
     /* The thread that owns the run; the writer sees those that do not change. What a tick reads lies together. */
     _Atomic uint64_t ring_full;

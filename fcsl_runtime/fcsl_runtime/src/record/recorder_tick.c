@@ -64,9 +64,9 @@ __attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_sta
     recorder->stepped = 1;
 }
 
-int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_verdict_row_t *rows)
+int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *rows)
 {
-    const uint32_t size = recorder->monitor->requirement_count * (uint32_t)sizeof *rows;
+    const uint32_t size = fcsl_verdict_rows_bytes(&recorder->verdicts);
     uint8_t *out = claim_tick(recorder, FCSL_RECORD_VERDICTS, stamp, size, recorder->tick_policy);
     if (out == NULL) {
         return -1;
@@ -79,7 +79,7 @@ int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const 
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const uint32_t size = recorder->machine->size;
-    const uint32_t remembered = recorder->monitor != NULL ? recorder->monitor->machine->size : 0u;
+    const uint32_t remembered = recorder->verdicts.monitor != NULL ? recorder->verdicts.monitor->machine->size : 0u;
     uint8_t *out = claim_tick(recorder, FCSL_RECORD_CHECKPOINT, stamp, size + remembered, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, recorder->live, size);

@@ -32,7 +32,7 @@ static int put_scratch(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t s
 static int put_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     return put_scratch(recorder, FCSL_TOPIC_CHECKPOINT, stamp,
-                       fcsl_checkpoint_message(recorder->machine, data, recorder->monitor,
+                       fcsl_checkpoint_message(recorder->machine, data, recorder->verdicts.monitor,
                                                data + recorder->machine->size, stamp, recorder->scratch,
                                                recorder->scratch_size));
 }
@@ -61,10 +61,9 @@ static int put_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8
 
 static int put_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
-    const fcsl_verdict_row_t *rows = (const void *)data; /* records are aligned */
-    return put_scratch(
-        recorder, recorder->own_topics - 1u, stamp,
-        fcsl_verdicts_message(recorder->monitor, rows, stamp, recorder->scratch, recorder->scratch_size));
+    return put_scratch(recorder, recorder->own_topics - 1u, stamp,
+                       fcsl_verdict_message(&recorder->verdicts, recorder->machine, data, stamp, recorder->scratch,
+                                            recorder->scratch_size));
 }
 
 /* Records one fcsl_msgs message of a tick, if there is something to say. */

@@ -45,19 +45,35 @@ typedef struct {
     uint8_t asked; /* whether `at_end` was asked for in the last evaluation, which did not fault */
 } fcsl_served_row_t;
 
+/* Where the monitor keeps a value of the first and of the last tick that violated a requirement. */
+typedef struct {
+    uint32_t first;
+    uint32_t last;
+} fcsl_kept_t;
+
 struct fcsl_monitor_run {
     const fcsl_monitor_t *monitor;
     fcsl_run_t *run;
     fcsl_observed_copy_t *copied;
     fcsl_results_t *results;
-    fcsl_served_row_t *rows; /* one for each requirement */
+    fcsl_served_row_t *rows; /* one for each requirement, and the kept values */
     fcsl_field_t *fields; /* of the rows, as they are served */
     char *paths;
     uint32_t field_count;
-    fcsl_verdict_row_t *noted; /* for each requirement: what was recorded last */
+    fcsl_kept_t *kept;
+    fcsl_field_t *kept_fields; /* the same, behind the rows, with paths and types of the machine that is watched */
+    uint32_t *kept_begin;      /* for each requirement its first one, and behind the last requirement their number */
+    fcsl_verdict_row_t *noted; /* for each requirement, and the kept values: what was recorded last */
     uint64_t forgot_before; /* the tick of the last restore that brought no memory of the requirements; 0: none */
     int is_noted; /* 0: nothing yet of this recording */
 };
+
+/* The scalar that a path names, and where it is; null where it names none. */
+const fcsl_field_t *fcsl_monitor_locate(const fcsl_machine_t *machine, const char *path, uint32_t *offset);
+/* Finds the kept values of all requirements; their arrays have room for `observed_count`. */
+void fcsl_kept_bind(struct fcsl_monitor_run *made, const fcsl_machine_t *watched);
+/* Copies those of a requirement behind the rows. */
+void fcsl_kept_gather(const struct fcsl_monitor_run *made, uint32_t index);
 
 static inline uint64_t fcsl_result_count(const uint8_t *data, uint32_t offset)
 {

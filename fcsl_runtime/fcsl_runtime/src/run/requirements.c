@@ -54,8 +54,7 @@ const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine)
     return NULL;
 }
 
-/* The scalar that a path names; 0 where it names none. */
-static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t *offset)
+const fcsl_field_t *fcsl_monitor_locate(const fcsl_machine_t *machine, const char *path, uint32_t *offset)
 {
     for (uint32_t i = 0; i < machine->field_count; i++) {
         const fcsl_field_t *field = &machine->fields[i];
@@ -66,10 +65,17 @@ static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t
         view_t view = fcsl_view_whole(field);
         if (fcsl_view_index(&view, path + length) == 0 && fcsl_view_count(&view) == 1) {
             *offset = field->offset + (uint32_t)fcsl_view_byte(&view, 0);
-            return fcsl_scalar_size(field->type);
+            return field;
         }
     }
-    return 0;
+    return NULL;
+}
+
+/* The same; its size, or 0. */
+static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t *offset)
+{
+    const fcsl_field_t *field = fcsl_monitor_locate(machine, path, offset);
+    return field != NULL ? fcsl_scalar_size(field->type) : 0u;
 }
 
 /* The fields of row `index`. */
@@ -140,6 +146,7 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
         };
         serve(made, i, instance);
     }
+    fcsl_kept_bind(made, machine);
     return 0;
 }
 
@@ -163,13 +170,19 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     made->copied = calloc(monitor->observed_count + 1u, sizeof *made->copied);
     made->results = calloc(monitor->requirement_count + 1u, sizeof *made->results);
     const size_t served = (size_t)monitor->requirement_count * SERVED_COUNT + 1u;
-    made->rows = calloc(monitor->requirement_count + 1u, sizeof *made->rows);
-    made->noted = calloc(monitor->requirement_count + 1u, sizeof *made->noted);
+    made->rows = calloc(1, (monitor->requirement_count + 1u) * sizeof *made->rows +
+                               (size_t)monitor->observed_count * 2u * FCSL_KEPT_LAST);
+    made->kept = calloc(monitor->observed_count + 1u, sizeof *made->kept);
+    made->kept_fields = calloc(monitor->observed_count + 1u, sizeof *made->kept_fields);
+    made->kept_begin = calloc(monitor->requirement_count + 1u, sizeof *made->kept_begin);
+    made->noted = calloc(1, (monitor->requirement_count + 1u) * sizeof *made->noted +
+                                (size_t)monitor->observed_count * FCSL_VERDICT_VALUE_BYTES);
     made->fields = calloc(served, sizeof *made->fields);
     made->paths = calloc(served, PATH_BYTES);
     made->run = fcsl_run_open_machine(monitor->machine, error);
     if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->noted == NULL ||
-        made->fields == NULL || made->paths == NULL) {
+        made->fields == NULL || made->paths == NULL || made->kept == NULL || made->kept_fields == NULL ||
+        made->kept_begin == NULL) {
         (void)fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
         fcsl_monitor_close(run);
         return -1;
@@ -195,6 +208,9 @@ void fcsl_monitor_close(fcsl_run_t *run)
     free(made->noted);
     free(made->fields);
     free(made->paths);
+    free(made->kept);
+    free(made->kept_fields);
+    free(made->kept_begin);
     free(made);
     run->monitor = NULL;
 }
@@ -253,12 +269,14 @@ const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *cou
 const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
 {
     const struct fcsl_monitor_run *made = run->monitor;
-    *size = made != NULL ? (uint32_t)(made->monitor->requirement_count * sizeof(fcsl_served_row_t)) : 0u;
+    *size = 0;
     if (made == NULL) {
         return NULL;
     }
+    const uint32_t count = made->monitor->requirement_count;
+    *size = (uint32_t)(count * sizeof(fcsl_served_row_t)) + made->kept_begin[count] * 2u * FCSL_KEPT_LAST;
     const uint8_t *data = made->run->data;
-    for (uint32_t i = 0; i < made->monitor->requirement_count; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         const fcsl_instance_t *instance = &made->monitor->machine->instances[made->monitor->requirements[i].instance];
         const fcsl_results_t *at = &made->results[i];
         made->rows[i] = (fcsl_served_row_t){
@@ -274,6 +292,9 @@ const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
             .holds = data[at->holds],
             .asked = fcsl_result_asked(made, data, i),
         };
+        if (made->rows[i].violations > 0) {
+            fcsl_kept_gather(made, i);
+        }
     }
     return made->rows;
 }

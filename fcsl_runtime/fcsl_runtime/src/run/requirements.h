@@ -9,6 +9,8 @@
 
 /* Copies what the requirements name, and steps the monitor. */
 void fcsl_monitor_tick(fcsl_run_t *run);
+/* For the recorder: without requirements, all null. */
+fcsl_verdict_table_t fcsl_monitor_table(const fcsl_run_t *run);
 /* A recording begins: what the verdicts are then is new to it. */
 void fcsl_monitor_record(fcsl_run_t *run);
 /* Into the recording: the verdicts after tick `tick`, if one has changed since they were recorded last. */

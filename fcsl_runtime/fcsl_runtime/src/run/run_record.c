@@ -15,7 +15,7 @@ int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_
     const fcsl_record_start_t start = {.machine = run->machine,
                                        .data = run->data,
                                        .views = fcsl_run_views(run),
-                                       .monitor = fcsl_run_monitor(run),
+                                       .verdicts = fcsl_monitor_table(run),
                                        .remembered = fcsl_run_monitor_data(run),
                                        .first = fcsl_run_stamp(run, fcsl_run_tick(run))};
     fcsl_monitor_record(run);

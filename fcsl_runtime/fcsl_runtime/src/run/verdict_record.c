@@ -5,6 +5,15 @@
 #include "monitor_run.h"
 #include "requirements.h"
 
+fcsl_verdict_table_t fcsl_monitor_table(const fcsl_run_t *run)
+{
+    const struct fcsl_monitor_run *made = run->monitor;
+    return made != NULL ? (fcsl_verdict_table_t){.monitor = made->monitor,
+                                                 .kept = made->kept_fields,
+                                                 .kept_begin = made->kept_begin}
+                        : (fcsl_verdict_table_t){0};
+}
+
 void fcsl_monitor_record(fcsl_run_t *run)
 {
     if (run->monitor != NULL) {
@@ -24,6 +33,17 @@ static fcsl_verdict_row_t row_of(const struct fcsl_monitor_run *made, uint32_t i
     return (fcsl_verdict_row_t){.violations = violations, .verdict = verdict, .holds = holds};
 }
 
+/* Those of the last violations, behind the rows. */
+static void put_values(const struct fcsl_monitor_run *made)
+{
+    const uint32_t count = made->monitor->requirement_count;
+    uint8_t *out = (uint8_t *)(made->noted + count);
+    for (uint32_t i = 0; i < made->kept_begin[count]; i++) {
+        memcpy(out + (size_t)i * FCSL_VERDICT_VALUE_BYTES, made->run->data + made->kept[i].last,
+               made->kept_fields[i].size);
+    }
+}
+
 __attribute__((hot)) void fcsl_monitor_note(fcsl_run_t *run, uint64_t tick)
 {
     struct fcsl_monitor_run *made = run->monitor;
@@ -36,7 +56,9 @@ __attribute__((hot)) void fcsl_monitor_note(fcsl_run_t *run, uint64_t tick)
         *noted = row;
     }
     if (changed) {
+        put_values(made);
         /* What found no room comes with the next tick. */
-        made->is_noted = fcsl_recorder_verdicts(run->recorder, fcsl_run_stamp(run, tick), made->noted) == 0;
+        made->is_noted =
+            fcsl_recorder_verdicts(run->recorder, fcsl_run_stamp(run, tick), (const uint8_t *)made->noted) == 0;
     }
 }

@@ -7,6 +7,7 @@
 #include "machine/fault_place.h"
 #include "run/lost_requests.h"
 #include "protocol.h"
+#include "value.h"
 
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
 {
@@ -73,6 +74,21 @@ void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine
 static const char *const KINDS[] = {"then", "never", "at_end"};
 static const char *const STATUS[] = {"met", "violated", "not exercised"};
 
+/* `behind` the values in the rows: those of the first tick, or of the last. */
+static void put_kept(fcsl_vars_out_t *out, const fcsl_run_t *run, const uint8_t *rows, uint32_t index, uint32_t behind)
+{
+    uint32_t count = 0;
+    const fcsl_field_t *kept = fcsl_run_kept_values(run, index, &count);
+    for (uint32_t i = 0; i < count; i++) {
+        const target_t target = {
+            .field = &kept[i], .machine = fcsl_run_machine(run), .view = fcsl_view_whole(&kept[i])};
+        fcsl_json_text(out, i > 0 ? "," : "");
+        fcsl_json_quoted(out, kept[i].path);
+        fcsl_json_text(out, ":");
+        fcsl_value_write(&target, rows + kept[i].offset + behind, out);
+    }
+}
+
 void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const uint8_t *data)
 {
     const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
@@ -101,6 +117,12 @@ void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const u
         if (verdict.violations > 0) {
             fcsl_vars_number(out, "first_tick", verdict.first_tick);
             fcsl_vars_number(out, "last_tick", verdict.last_tick);
+            fcsl_vars_begin(out, "first");
+            put_kept(out, run, data, i, 0);
+            fcsl_vars_end(out);
+            fcsl_vars_begin(out, "last");
+            put_kept(out, run, data, i, FCSL_KEPT_LAST);
+            fcsl_vars_end(out);
         }
         fcsl_vars_end(out);
     }

@@ -164,7 +164,8 @@ class Scene:
             self._static(lane, rr.StateConfiguration(values=["violated"], colors=[_HEALTH_COLOURS[-2]]))
         for one in self.cast.violations:
             self._event(lanes[one.id], one.start_ns / _NS, rr.StateChange(state="violated"))
-            self._event(log, one.start_ns / _NS, rr.TextLog(f"{one.id} violated: {one.text}", level="ERROR"))
+            text = f"{one.id} violated: {one.text}" + (f" ({one.values})" if one.values else "")
+            self._event(log, one.start_ns / _NS, rr.TextLog(text, level="ERROR"))
             if one.ended:
                 self._event(lanes[one.id], one.end_ns / _NS, rr.StateChange(state=""))
                 self._event(log, one.end_ns / _NS, rr.TextLog(f"{one.id} holds again", level="INFO"))

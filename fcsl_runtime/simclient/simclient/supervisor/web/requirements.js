@@ -6,6 +6,11 @@ import { element } from "./panels.js";
 
 const CLASSES = { met: "nominal", violated: "failed", "not exercised": "stale" };
 
+/** Values by path as a text. */
+function shown(values) {
+  return Object.entries(values).map(([path, value]) => `${path} = ${value}`).join(", ");
+}
+
 export class Requirements {
   #table;
   #id = null;  // null: nothing to show
@@ -42,6 +47,7 @@ export class Requirements {
       element("td", { textContent: verdict.exercised }),
       element("td", { textContent: verdict.violations }),
       element("td", { textContent: verdict.first_tick ?? "" }),
+      element("td", { textContent: shown(verdict.first ?? {}), className: "long" }),
       element("td", { textContent: verdict.text, className: "long" }))));
   }
 }
