@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .descriptor import Channel, FaultPlace, Field, Instance, Machine, Transition
     from .errors import BagError, MapError, OverwrittenWarning, TwinError
+    from .requirements import not_exercised
     from .telemetry.receiver import Telemetry
     from .twin.alg_twin import AlgTwin, PyTwin
     from .twin.process_twin import ProcessTwin
@@ -49,6 +50,7 @@ _HOME = {
     "VarError": "vars.wire",
     "diff": "twin.snapshot",
     "find_violation": "twin.search",
+    "not_exercised": "requirements",
 }
 
 __all__ = [
@@ -71,6 +73,7 @@ __all__ = [
     "VarError",
     "diff",
     "find_violation",
+    "not_exercised",
 ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -88,6 +88,14 @@ def read_violations(lib: Any, handle: int) -> list[float]:
         violated = float(max(raw.violations, raw.status == _VIOLATED))
         found.append(math.nan if raw.status == _NOT_EXERCISED else violated)
     return found
+
+
+def not_exercised(flights: Iterable[Mapping[str, Verdict]]) -> list[str]:
+    """The ids of the requirements that none of some flights exercised. Of each flight: `requirements` of its twin."""
+    flown = list(flights)
+    ids = dict.fromkeys(id_ for verdicts in flown for id_ in verdicts)
+    silent = Status.NOT_EXERCISED
+    return [id_ for id_ in ids if all(verdicts[id_].status is silent for verdicts in flown if id_ in verdicts)]
 
 
 #: The state of a requirement that only counts.
