@@ -102,8 +102,8 @@ class AlgorithmWriter:
         named = [] if r.hold else list(enumerate(self.signals.instances(r)))
         guards = [f"{self._input(f'{name}.outputs.health', f'health_{n}')} == {_STALE}" for n, name in named]
         due = self._due()
-        lines = [f"tick = {ticks} - 1"]
-        lines += ["if self.last_tick != tick - 1:", "    self.started = False"]
+        lines = [f"tick = wrap_sub({ticks}, 1)"]  # which cannot fault, so that the memory needs no copy to restore
+        lines += ["if self.last_tick != wrap_sub(tick, 1):", "    self.started = False"]
         if r.clock is not None:
             faults = self._input(f"{r.clock}.counters.faults", "faults")
             lines += ["    if tick > 0:", f"        self.faults_before = {faults}"]
@@ -150,7 +150,7 @@ class AlgorithmWriter:
         if self.requirement.within_ticks:
             lines += ["if not wrong:", "    self.late_from = -1"]
             lines += ["elif self.late_from < 0 or restarted:", "    self.late_from = tick"]
-            lines += [f"wrong = wrong and tick - self.late_from >= {self.requirement.within_ticks}"]
+            lines += [f"wrong = wrong and wrap_sub(tick, self.late_from) >= {self.requirement.within_ticks}"]
         return lines
 
     def _class(self, state: Mapping[str, str], lines: list[str]) -> str:

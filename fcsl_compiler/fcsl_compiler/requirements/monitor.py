@@ -86,20 +86,24 @@ class _Reporting(AlgorithmWriter):
         return [*super().interrupted(), *asked]
 
     def verdict(self, when: Truth | None, wrong: list[str]) -> list[str]:
-        lines = [*wrong, "self.evaluated += 1"]
+        lines = [*wrong, _count("evaluated")]
         if when is None:
-            lines += ["self.exercised += 1"]
+            lines += [_count("exercised")]
         else:
-            lines += [f"when_false = {when.false}", "if when_true:", "    self.exercised += 1"]
-            lines += ["elif not when_false:", "    self.undefined += 1"]
+            lines += [f"when_false = {when.false}", "if when_true:", f"    {_count('exercised')}"]
+            lines += ["elif not when_false:", f"    {_count('undefined')}"]
         if self.requirement.kind == "at_end":
             return [*lines, f"self.asked = {'True' if when is None else 'when_true'}", "self.holds = not wrong"]
         keep = [f"self.{{}}_{name.removeprefix('self.')} = {name}" for name in self.values]
         lines += ["if wrong:"]
         lines += ["    if self.violations == 0:", "        self.first_tick = tick"]
         lines += [f"        {line.format('first')}" for line in keep]
-        lines += ["    if not self.violated or restarted:", "        self.violations += 1"]
-        lines += ["    self.violated_ticks += 1", "    self.last_violated = tick"]
+        lines += ["    if not self.violated or restarted:", f"        {_count('violations')}"]
+        lines += [f"    {_count('violated_ticks')}", "    self.last_violated = tick"]
         lines += [f"    {line.format('last')}" for line in keep]
         lines += ["self.violated = wrong", "self.holds = not wrong"]
         return lines
+
+
+def _count(name: str) -> str:
+    return f"self.{name} = wrap_add(self.{name}, 1)"

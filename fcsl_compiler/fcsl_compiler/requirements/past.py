@@ -96,9 +96,12 @@ class PastWriter:
         ticks = self._ticks(node)
         unsure, wrong = self._keep(f"{name}_not_true", "i64"), self._keep(f"{name}_false", "i64")
         self._now(name, code.truth(node.parts[0]))
-        self.lines += ["if restarted:", f"    {unsure} = tick - 1", f"    {wrong} = tick - 1"]
+        self.lines += ["if restarted:", f"    {unsure} = wrap_sub(tick, 1)", f"    {wrong} = wrap_sub(tick, 1)"]
         self.lines += [f"if not {name}_now:", f"    {unsure} = tick", f"if {name}_not:", f"    {wrong} = tick"]
-        self.lines += [f"{name}_true = {unsure} < tick - {ticks}", f"{name}_false = {wrong} >= tick - {ticks}"]
+        self.lines += [
+            f"{name}_true = {unsure} < wrap_sub(tick, {ticks})",
+            f"{name}_false = {wrong} >= wrap_sub(tick, {ticks})",
+        ]
 
     def _within(self, node: Node, name: str, code: Code) -> None:
         ticks = self._ticks(node)
@@ -110,8 +113,8 @@ class PastWriter:
         self.lines += [f"if not {name}_not and {maybe} < 0:", f"    {maybe} = tick"]
         self.lines += [f"if not {name}_response_not:", f"    {sure} = -1"]
         self.lines += [f"if {name}_response_now:", f"    {maybe} = -1"]
-        self.lines += [f"{name}_true = {maybe} < 0 or {maybe} > tick - {ticks}"]
-        self.lines += [f"{name}_false = {sure} >= 0 and {sure} <= tick - {ticks}"]
+        self.lines += [f"{name}_true = {maybe} < 0 or {maybe} > wrap_sub(tick, {ticks})"]
+        self.lines += [f"{name}_false = {sure} >= 0 and {sure} <= wrap_sub(tick, {ticks})"]
 
     def _max_over(self, node: Node, name: str, code: Code) -> None:
         self._extreme(node, name, code, "greatest", "-inf")
@@ -120,8 +123,8 @@ class PastWriter:
         self._extreme(node, name, code, "least", "inf")
 
     def _extreme(self, node: Node, name: str, code: Code, better: str, none: str) -> None:
-        """A value for each tick of the window, and over them a tree of the better one of two: both what comes and what
-        leaves the window changes one value on each level."""
+        """A value for each tick of the window, and over them a tree of the better one of two: a new value changes one on each
+        level."""
         ticks = self._ticks(node)
         levels = max(ticks, 1).bit_length()
         size = 1 << levels
@@ -130,20 +133,18 @@ class PastWriter:
         self.lines += ["if restarted:"]
         for level, array in enumerate(kept):
             self.lines += [f"    for i in range({size >> level}):", f"        {array}[i] = {none}"]
-        self.lines += [f"    {last} = tick - 1"]
-        self.lines += [
-            f"for j in range({ticks + 1}):",
-            f"    if {last} - {ticks} + j >= tick - {ticks}:",
-            "        break",
-        ]
-        self.lines += [f"    {line}" for line in self._put(name, kept, f"({last} - {ticks} + j)", none, better)]
-        self.lines += self._put(name, kept, "tick", code.number(node.parts[0]), better)
+        self.lines += [f"    {last} = wrap_sub(tick, 1)"]
+        # The place of a tick is that of the tick that leaves the window. Those that were not evaluated leave nothing.
+        self.lines += [f"for j in range(1, {ticks + 2}):", f"    if wrap_add({last}, j) >= tick:", "        break"]
+        gone = f"{name}_gone = wrap_add({last}, j) % {ticks + 1}"
+        self.lines += [f"    {line}" for line in (gone, *self._put(f"{name}_gone", kept, none, better))]
+        value = code.number(node.parts[0])
+        self.lines += [f"{name}_at = tick % {ticks + 1}", *self._put(f"{name}_at", kept, value, better)]
         self.lines += [f"{last} = tick", f"{name} = {kept[-1]}[0]"]
 
-    def _put(self, name: str, kept: list[str], tick: str, value: str, better: str) -> list[str]:
-        size = 1 << (len(kept) - 1)
-        at = f"{name}_at"
-        lines = [f"{at} = {tick} % {size}", f"{kept[0]}[{at}] = {value}"]
+    def _put(self, at: str, kept: list[str], value: str, better: str) -> list[str]:
+        """`at`: a local that is assigned once, so that no index can be outside."""
+        lines = [f"{kept[0]}[{at}] = {value}"]
         for level, (below, array) in enumerate(zip(kept, kept[1:], strict=False), 1):
             pair = f"{at} // {1 << level}"
             lines.append(f"{array}[{pair}] = {better}({below}[{pair} * 2], {below}[{pair} * 2 + 1])")
