@@ -392,6 +392,19 @@ def test_requirements_of_parts_are_of_the_machine(tmp_path: Path) -> None:
     assert machine.hashed_text == compile_machine(write(tmp_path), "", until="schedule").checked.hashed_text
 
 
+def test_a_requirement_of_a_part_acts_on_its_instances(tmp_path: Path) -> None:
+    def change(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+        effect = {"degrade": "law"}
+        attitude["requirements"] = [{"id": "A-1", "text": "It waits.", "then": "machine.tick < 5", "effect": effect}]
+        craft["transitions"].append({"from": "FLY", "to": "HOLD", "requirement": "att.A-1", "priority": 3})
+
+    twins = Twins(write(tmp_path, change))
+    twins.step(4)
+    assert twins.get("att.law.outputs.health") == "nominal" and twins.native.state == "FLY"
+    twins.step(6)
+    assert twins.get("att.law.outputs.health") == "degraded" and twins.native.state == "HOLD"
+
+
 def test_a_wrong_requirement_in_the_file_that_a_part_names(tmp_path: Path) -> None:
     wrong = {**FILES, "parts/rate/required.json": RATE_REQUIREMENTS.replace("pi.state", "pi.stat")}
     found = said(diagnose(tmp_path, with_requirements, wrong)[0])
