@@ -41,8 +41,13 @@ class Summary:
     output: Path | None = None
     stack_bytes: int | None = None
 
+    @property
+    def instance_count(self) -> int:
+        """Without those that requirements become."""
+        return len(self.machine.instances) - len(self.machine.effects)
+
     def text(self) -> str:
-        parts = _count(len(self.machine.instances), "instance"), _count(len(self.machine.states), "state")
+        parts = _count(self.instance_count, "instance"), _count(len(self.machine.states), "state")
         return f"{self.config}: ok ({', '.join(parts)})"
 
 
@@ -128,7 +133,7 @@ def _summary(m: Summary) -> dict[str, object]:
     content: dict[str, object] = {
         "config": str(m.config),
         "name": m.machine.name,
-        "instances": len(m.machine.instances),
+        "instances": m.instance_count,
         "states": len(m.machine.states),
     }
     if m.output is not None:
