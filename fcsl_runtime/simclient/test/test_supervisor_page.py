@@ -150,7 +150,26 @@ def test_requirements_are_shown_with_their_verdicts(
         row[1:6] = "violated", "4", "1", "3", "src.outputs.x = 3"
         page.wait(f"JSON.stringify({cells}[0]) === JSON.stringify({json.dumps(row)})")
         assert page.run(f"{cells}[1][1]") == "met"
+        choose(page, "src.outputs.x")
+        page.wait("document.querySelector('#band').ariaLabel.endsWith(', LOW-1 violated')")
+        band = "[251, 220, 218, 255]"
+        page.wait(
+            "(() => { const canvas = document.querySelector('.panel canvas');"
+            " const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);"
+            f" return data.some((_, i) => i % 4 === 0 && {band}.every((part, k) => data[i + k] === part)); }})()"
+        )
     supervisor.ask("DELETE", f"/runs/{run['id']}")
+
+
+def test_ticks_of_violations_are_those_that_two_verdicts_show(page: Page) -> None:
+    verdicts = [(1, 3, 12), (1, 5, 14), (2, 6, 20), (5, 11, 40), (5, 11, 40), (1, 3, 12)]
+    shown = [{"violations": n, "violated_ticks": ticks, "last_tick": last} for n, ticks, last in verdicts]
+    found = page.run(
+        f"import('/requirements.js').then(({{ violatedTicks }}) => {json.dumps(shown)}.map((now, i, all) =>"
+        " violatedTicks(all[i - 1] ?? { violations: 0, violated_ticks: 0 }, now)))"
+    )
+    spans = [one and (one["first"], one["last"], one["continues"]) for one in found]
+    assert spans == [(10, 12, False), (13, 14, True), (20, 20, False), (40, 40, False), None, None]
 
 
 def test_what_is_refused_is_said(page: Page) -> None:

@@ -57,8 +57,8 @@ class Panel {
     this.curves = this.curves.filter((curve) => curve.name !== name);
   }
 
-  draw(series, from, to) {
-    drawCurves(this.canvas, series, this.curves, from, to);
+  draw(series, from, to, violated) {
+    drawCurves(this.canvas, series, this.curves, from, to, violated);
     for (const curve of this.curves) {
       const value = series.columns.get(curve.name)?.at(-1) ?? null;
       curve.value.textContent = value === null ? "–" : shortest(value, curve.labels);
@@ -113,8 +113,8 @@ export class Panels {
     this.onChange();
   }
 
-  draw(series, from, to) {
-    for (const panel of this.#panels) panel.draw(series, from, to);
+  draw(series, from, to, violated) {
+    for (const panel of this.#panels) panel.draw(series, from, to, violated);
   }
 
   #make(title, unit) {

@@ -6,6 +6,7 @@ import { indexAt } from "./series.js";
 export const COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b58900", "#56b4e9", "#7a5195", "#8c564b"];
 const LEFT = 64, RIGHT = 8, TOP = 6, BOTTOM = 20;
 const GRID = "#e4e7ea", INK = "#5b6570", FONT = "11px system-ui, sans-serif";
+const VIOLATED_FILL = "#fbdcda", VIOLATED_INK = "#b3201f";
 const STATE_FILLS = ["#cfe3f5", "#fbe0c8", "#cdeadd", "#f4dbe9", "#f7ecc4", "#e2dcf0", "#e6d9d5", "#dde2e6"];
 
 /** The canvas' context in CSS pixels, cleared, and its size. */
@@ -56,16 +57,17 @@ function extent(columns, from) {
 }
 
 /**
- * Curves of a series, from `from` to `to` s. `curves`: name, color, role.
- * Values that are unknown, and ticks that are missing, leave a gap.
+ * Curves of a series, from `from` to `to` s. `curves`: name, color, role. `violated`: id of a requirement, and the time in
+ * which it was violated. Values that are unknown, and ticks that are missing, leave a gap.
  */
-export function drawCurves(canvas, series, curves, from, to) {
+export function drawCurves(canvas, series, curves, from, to, violated) {
   const { context, width, height } = begin(canvas);
   const first = Math.max(0, indexAt(series.time, from) - 1);
   const shown = curves.map((curve) => series.columns.get(curve.name) ?? []);
   const [low, high] = extent(shown, first) ?? [0, 1];
   const x = (time) => LEFT + ((time - from) / (to - from)) * (width - LEFT - RIGHT);
   const y = (value) => TOP + ((high - value) / (high - low)) * (height - TOP - BOTTOM);
+  drawViolated(context, violated, x, width, height);
   drawAxes(context, { width, height, x, y, from, to, low, high });
   context.save();
   context.beginPath();
@@ -78,6 +80,19 @@ export function drawCurves(canvas, series, curves, from, to) {
     else drawLine(context, series, shown[index], first, x, y, curves[index].role);
   }
   context.restore();
+}
+
+/** A band for each violation, at least a pixel wide, with the id where it begins. */
+function drawViolated(context, violated, x, width, height) {
+  context.textBaseline = "top";
+  context.textAlign = "left";
+  for (const { id, from, to } of violated) {
+    const [left, right] = [Math.floor(Math.max(x(from), LEFT)), Math.min(x(to), width - RIGHT)];
+    context.fillStyle = VIOLATED_FILL;
+    context.fillRect(left, TOP, Math.max(1, right - left), height - TOP - BOTTOM);
+    context.fillStyle = VIOLATED_INK;
+    context.fillText(id, left + 2, TOP + 2);
+  }
 }
 
 function drawAxes(context, { width, height, x, y, from, to, low, high }) {

@@ -20,6 +20,7 @@ export class RunView {
   status = "";
   #numbers = [];
   #series = new Series();
+  #hz = 0;  // ticks per second
   #arrivals = [];  // of updates, ms
   #drawing = false;
 
@@ -80,6 +81,7 @@ export class RunView {
     const sent = await ask("GET", `${at}/channels`);
     if (this.id !== id || this.#numbers.length > 0) return;
     this.#numbers = numbersOf(sent.channels);
+    this.#hz = sent.tick_hz;
     for (const { title, curves } of panelsOf(run.views, this.#numbers)) {
       if (this.panels.curves.length + curves.length <= CURVES_MAX) this.panels.open(title, curves);
     }
@@ -136,9 +138,14 @@ export class RunView {
       const series = this.#series, seconds = Number($("seconds").value);
       const from = Math.max(0, series.newest - seconds), to = from + seconds;
       drawStates($("band"), series, from, to);
-      this.panels.draw(series, from, to);
+      const violated = this.requirements.spans
+        .map(({ id, first, last }) => ({ id, from: first / this.#hz, to: (last + 1) / this.#hz }))
+        .filter((span) => span.to > from && span.from < to);
+      this.panels.draw(series, from, to, violated);
       const state = series.states.at(-1);
-      $("band").setAttribute("aria-label", state ? `state ${state[1]} since ${state[0].toFixed(2)} s` : "state unknown");
+      const words = [state ? `state ${state[1]} since ${state[0].toFixed(2)} s` : "state unknown",
+        ...new Set(violated.map(({ id }) => `${id} violated`))];
+      $("band").setAttribute("aria-label", words.join(", "));
       $("pictures").dataset.drawn = series.newest;
     });
   }
