@@ -182,6 +182,8 @@ def test_a_body_without_a_length_is_bounded_too(supervisor: Supervisor) -> None:
         ("DELETE", "/runs", 405, "bad_method"),
         *(("GET", f"{path}?x=1", 400, "bad_request") for path in ("/health", "/metrics", "/runs", "/runs/1")),
         *(("GET", f"/runs/1/{part}?x=1", 400, "bad_request") for part in ("health", "channels", "values", "windows")),
+        ("GET", "/runs/1/requirements?x=1", 400, "bad_request"),
+        ("GET", "/runs/77/requirements", 404, "unknown_run"),
         ("GET", "/stream?x=1", 400, "bad_request"),
         ("DELETE", "/runs/1?x=1", 400, "bad_request"),
         ("GET", "/health?" + "x" * 2000, 400, "bad_request"),

@@ -132,9 +132,8 @@ class _Routes:
         return Json(channels(self._run(request).telemetry))
 
     def values(self, request: Request) -> Response:
-        return Json(
-            run_status.values(self._run(request), request_parameters.paths(request_parameters.query(request, "path")))
-        )
+        paths = request_parameters.paths(request_parameters.query(request, "path"))
+        return Json(run_status.values(self._run(request), paths))
 
     def window(self, request: Request) -> Response:
         wants_arrow = request_parameters.wants_arrow(request.headers.get("accept", "*/*"))
