@@ -5,7 +5,8 @@ anything failed.
     python3 scripts/test.py [BASE]    of the packages' tests only those that a change since commit BASE touches
 
 Many tests wait, and at the end of each run some workers have nothing to do: two runs share the computer, the longest first, and
-each has three workers of pytest for two cores. Tests share no port, path or ROS domain.
+each has three workers of pytest for two cores. Packages with few tests share one run, a process each, since workers would
+start for longer than they test. Tests share no port, path or ROS domain.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from changed_packages import changed_files, touched
 from jobs import ROOT, Job, repeat_failures, run_all, say
 
 AT_ONCE = 2
-#: Those that take longest, in this order; the others follow.
-LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_sim", "fcsl_hal", "quadrotor")
+#: Those with many tests, the longest first; the others follow in one run.
+LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_blocks", "fcsl_sim", "fcsl_hal")
 RESULTS = ROOT / "build"
 WORKSPACE_RESULTS = RESULTS / "workspace_tests.xml"
 #: Upper bound of a run, seconds.
@@ -37,13 +38,12 @@ def workers() -> list[str]:
     return [f"-n{min(cores + cores // 2, 6)}", "--dist=worksteal"]
 
 
-def package_job(name: str) -> Job:
-    """Python packages get pytest's options by colcon, which sets PYTEST_ADDOPTS itself; the others by PYTEST_ADDOPTS. The space
-    keeps an option from being taken for colcon's own."""
-    options = [f" {option}" for option in workers()]
-    line = ["colcon", "--log-base", f"log/test/{name}", "test", "--packages-select", name]
-    line += ["--event-handlers", "console_direct+", "summary-", "--pytest-args", *options]
-    return Job(f"tests of {name}", tuple(line), {"PYTEST_ADDOPTS": " ".join(workers())})
+def package_job(label: str, names: Sequence[str], options: Sequence[str]) -> Job:
+    """`options` are pytest's. Python packages get them by colcon, which sets PYTEST_ADDOPTS itself; the others by PYTEST_ADDOPTS. The
+    space keeps an option from being taken for colcon's own."""
+    line = ["colcon", "--log-base", f"log/test/{names[0]}", "test", "--packages-select", *names]
+    line += ["--event-handlers", "console_direct+", "summary-", "--pytest-args", *(f" {option}" for option in options)]
+    return Job(f"tests of {label}", tuple(line), {"PYTEST_ADDOPTS": " ".join(options)})
 
 
 def workspace_job() -> Job:
@@ -52,9 +52,9 @@ def workspace_job() -> Job:
 
 
 def longest_first(packages: list[str]) -> list[Job]:
-    names = [*packages, "test"]
-    ordered = [n for n in LONGEST if n in names] + sorted(n for n in names if n not in LONGEST)
-    return [workspace_job() if name == "test" else package_job(name) for name in ordered]
+    names, short = [n for n in LONGEST if n in (*packages, "test")], sorted(set(packages) - set(LONGEST))
+    jobs = [workspace_job() if name == "test" else package_job(name, [name], workers()) for name in names]
+    return [*jobs, package_job("short packages", short, ["-n0"])] if short else jobs
 
 
 def all_packages() -> list[str]:
