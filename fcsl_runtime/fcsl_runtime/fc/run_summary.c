@@ -12,7 +12,7 @@
 #include "log.h"
 #include "run/lost_requests.h"
 
-enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024, REQUIREMENTS_BYTES = 1024 };
+enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024, REQUIREMENTS_BYTES = 1024, ANEW_BYTES = 128 };
 
 static void report_times(const char *what, const fcsl_histogram_t *histogram)
 {
@@ -77,11 +77,13 @@ static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *d
     }
 }
 
-/* A line for each violated requirement, and one that says how many were met and which were not exercised. */
+/* A line for each violated requirement, and one that says how many were met, which were not exercised, and whether a
+ * checkpoint made them begin anew. */
 static void report_requirements(const fcsl_run_t *run, const uint8_t *verdicts)
 {
     const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
     char silent[REQUIREMENTS_BYTES] = "";
+    char anew[ANEW_BYTES] = "";
     size_t at = 0;
     uint32_t met = 0;
     for (uint32_t i = 0; monitor != NULL && i < monitor->requirement_count; i++) {
@@ -89,6 +91,10 @@ static void report_requirements(const fcsl_run_t *run, const uint8_t *verdicts)
         char text[FCSL_VERDICT_TEXT_MAX];
         fcsl_run_verdict(run, verdicts, i, &verdict);
         met += verdict.status == FCSL_MET;
+        if (verdict.forgot_before > 0) {
+            (void)snprintf(anew, sizeof anew, "; begun anew at tick %" PRIu64 ": the checkpoint has no memory of them",
+                           verdict.forgot_before);
+        }
         if (verdict.status == FCSL_VIOLATED) {
             fcsl_run_verdict_text(run, &verdict, text);
             log_info("requirement %s", text);
@@ -99,7 +105,7 @@ static void report_requirements(const fcsl_run_t *run, const uint8_t *verdicts)
         }
     }
     if (monitor != NULL) {
-        log_info("requirements: %" PRIu32 " of %" PRIu32 " met%s", met, monitor->requirement_count, silent);
+        log_info("requirements: %" PRIu32 " of %" PRIu32 " met%s%s", met, monitor->requirement_count, silent, anew);
     }
 }
 

@@ -54,6 +54,7 @@ class Verdict:
     last_tick: int | None
     first: dict[str, Any] = field(default_factory=dict)
     last: dict[str, Any] = field(default_factory=dict)
+    forgot_before: int | None = None  # tick of a restore that brought no memory of it: it began anew
     line: str = ""  # what a run prints at its end
 
     def __str__(self) -> str:
@@ -157,6 +158,7 @@ class _Reader:
             last_tick=raw.last_tick if begun else None,
             first=first,
             last=last,
+            forgot_before=raw.forgot_before or None,
             line=text.value.decode("utf-8", "replace"),
         )
 
@@ -205,10 +207,13 @@ def _names(path: str, watched: Machine) -> Sequence[str]:
 
 
 def summary(verdicts: Sequence[Verdict]) -> list[str]:
-    """The lines at the end of a run: each violated requirement; how many were met, and which were not exercised."""
+    """The lines at the end of a run: each violated requirement; how many were met, which were not exercised, and whether a
+    checkpoint made them begin anew."""
     if not verdicts:
         return []
     lines = [f"requirement {verdict}" for verdict in verdicts if verdict.status is Status.VIOLATED]
     met = sum(verdict.status is Status.MET for verdict in verdicts)
     silent = ", ".join(verdict.id for verdict in verdicts if verdict.status is Status.NOT_EXERCISED)
-    return [*lines, f"requirements: {met} of {len(verdicts)} met" + (f"; not exercised: {silent}" if silent else "")]
+    anew = verdicts[0].forgot_before
+    line = f"requirements: {met} of {len(verdicts)} met" + (f"; not exercised: {silent}" if silent else "")
+    return [*lines, line + (f"; begun anew at tick {anew}: the checkpoint has no memory of them" if anew else "")]

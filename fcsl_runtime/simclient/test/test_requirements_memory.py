@@ -18,6 +18,7 @@ from simclient import AlgTwin, ProcessTwin, PyTwin, TwinError
 from simclient.bag import formats
 from simclient.machine_build import build_config
 from simclient.replay.reproduce import Replay
+from simclient.requirements import summary
 from simclient.run import open_run
 from simclient.twin.black_box import BlackBox
 
@@ -113,18 +114,24 @@ def of_others(content: bytearray, begin: int, end: int) -> None:
 def test_without_its_memory_a_requirement_begins_anew_and_says_so(
     held: Path, change: Callable[[bytearray, int, int], None]
 ) -> None:
-    with AlgTwin.from_config(held) as twin, AlgTwin.from_config(held) as other:
+    with (
+        AlgTwin.from_config(held) as twin,
+        AlgTwin.from_config(held) as other,
+        ProcessTwin.from_config(held) as process,
+    ):
         twin.tick(15)
         saved = twin.save()
-        other.restore(changed(saved, change))
-        for each in (twin, other):
-            each.tick(3)
+        twin.tick(3)
         assert twin.requirements["H"].status == "met" and "anew" not in str(twin.requirements["H"])
-        again = other.requirements["H"]
-        assert again.violations == 1 and again.first_tick == 15  # nothing has been held for so long
-        assert str(again).endswith("began anew at tick 15: the checkpoint has no memory of this requirement")
-        other.restore(saved)
-        assert "anew" not in str(other.requirements["H"])
+        for each in (other, process):
+            each.restore(changed(saved, change))
+            each.tick(3)
+            again = each.requirements["H"]
+            assert again.violations == 1 and again.first_tick == 15  # nothing has been held for so long
+            assert str(again).endswith("began anew at tick 15: the checkpoint has no memory of this requirement")
+            assert summary([again])[-1].endswith("; begun anew at tick 15: the checkpoint has no memory of them")
+            each.restore(saved)
+            assert "anew" not in str(each.requirements["H"]) + summary([each.requirements["H"]])[-1]
 
 
 def cut_short(content: bytearray, begin: int, end: int) -> None:

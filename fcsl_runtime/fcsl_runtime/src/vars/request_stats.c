@@ -114,6 +114,9 @@ void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const u
         fcsl_vars_number(out, "faults", verdict.faults);
         fcsl_vars_number(out, "violations", verdict.violations);
         fcsl_vars_number(out, "violated_ticks", verdict.violated_ticks);
+        if (verdict.forgot_before > 0) {
+            fcsl_vars_number(out, "forgot_before", verdict.forgot_before);
+        }
         if (verdict.violations > 0) {
             fcsl_vars_number(out, "first_tick", verdict.first_tick);
             fcsl_vars_number(out, "last_tick", verdict.last_tick);
