@@ -11,7 +11,7 @@ from rrd import read_rrd, values, views
 from test_record import MESSAGES, declarations
 from test_requirements import fly, machine
 
-from simclient import AlgTwin
+from simclient import AlgTwin, TwinError
 from simclient.bag import formats
 from simclient.bag.violations import violations
 from simclient.requirements import Status, Verdict
@@ -94,3 +94,12 @@ def test_rerun_shows_when_a_requirement_was_violated(
     assert (begun[0][0], f"LOW.2 violated: n is small. ({values_of_it})") in log
     assert (found[0].end_ns / 1e9, "LOW.2 holds again") in log
     assert views(tmp_path / "run.rrd")["requirements"] == "StateTimeline"
+
+
+def test_requirements_are_chosen_before_a_recording(tmp_path: Path) -> None:
+    """The recorder reads the struct of their monitor."""
+    required = [{"id": "LOW", "text": "x is small.", "then": "src.outputs.x < 1.5"}]
+    with AlgTwin.from_config(machine(tmp_path, required)) as twin:
+        twin.record(tmp_path / "flight")
+        with pytest.raises(TwinError, match="before recording begins"):
+            twin._restart_requirements()
