@@ -39,7 +39,7 @@ FOLDERS: dict[str, Sequence[str]] = {
             "requirements",
             "driver",
         ),
-        *("board", "graph", "build_report", "reference", "cli", "api"),
+        *("board", "graph", "build_report", "reference", "prove", "cli", "api"),
     ),
     "simclient": (
         "",

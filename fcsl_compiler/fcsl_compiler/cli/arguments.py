@@ -31,6 +31,7 @@ _EXAMPLES = {
     "new algorithm": "slew",
     "new plant": "mass --machine craft.json",
     "new vehicle": "falcon --like quadrotor",
+    "prove": "craft.json --only LND-8 -o tests",
     "cover": "craft.json --fail-under mcdc=100 -- python3 -m pytest test",
 }
 _TARGET_HELP = f"which of the machine's `targets` its externs are linked from (default: {DEFAULT_TARGET})"
@@ -121,6 +122,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
         help="write the list of input files here, one per line, for build systems",
     )
     _add_authoring(commands)
+    _add_prove(commands)
     _add_cover(commands)
     add_examples(parser, _EXAMPLES)
     return parser
@@ -197,6 +199,28 @@ def _add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     )
     vehicle.add_argument("name", help="lower_snake_case")
     vehicle.add_argument("--like", required=True, metavar="VEHICLE", help="a package, such as quadrotor, or its folder")
+
+
+def _add_prove(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command to fcslc's parser."""
+    prove = _add(commands, "prove", "show that requirements and assertions hold for all inputs, or how they fail")
+    prove.add_argument("config", type=Path, help="machine JSON")
+    prove.add_argument("--requirements", type=Path, metavar="FILE", help="instead of the machine's own")
+    prove.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="ID",
+        help="a requirement, an assertion or a state; repeat for more",
+    )
+    prove.add_argument("--seconds", type=float, default=60.0, metavar="SECONDS", help="time for all of them (default: 60)")
+    prove.add_argument("--depth", type=int, default=24, metavar="N", help="ticks from the beginning (default: 24)")
+    prove.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="write a pytest test for each that does not hold"
+    )
+    prove.add_argument(
+        "--json", action="store_const", const="json", default="text", dest="format", help="print one JSON document"
+    )
 
 
 def _add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -10,6 +10,8 @@ The search finds what was refuted or reported, and nothing else."""
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -145,3 +147,22 @@ def test_what_no_flight_exercised_is_named() -> None:
 
     assert not_exercised([fly(0), fly(0)]) == ["SWIM-1B", "SWIM-2"]
     assert not_exercised([fly(0), fly(1)]) == ["SWIM-2"]
+
+
+def test_the_prover_answers_as_kind_2_did(tmp_path: Path) -> None:
+    """Of the state machines. AlgTwin repeats each flight that it found."""
+    line = ["fcsl", "prove", str(config("fsm")), "--json", "-o", str(tmp_path)]
+    found = subprocess.run(line, capture_output=True, text=True, timeout=300, check=False)
+    assert found.returncode == 1, found.stderr
+    proofs = json.loads(found.stdout)["results"]
+    refuted = [r["id"] for r in proofs if r["answer"] == "refuted"]
+    assert {r["answer"] for r in proofs} == {"proven", "refuted"} and refuted == list(CHALLENGES["fsm"].refuted)
+    tests = [sys.executable, "-m", "pytest", "-q", "-n0", str(tmp_path)]
+    ran = subprocess.run(tests, capture_output=True, text=True, timeout=300, check=False)
+    assert f"{len(refuted)} passed" in ran.stdout, ran.stdout
+    (tmp_path / "proofs.json").write_text(found.stdout)
+    matrix = subprocess.run(
+        ["fcsl", "trace", str(config("fsm")), "--proofs", str(tmp_path / "proofs.json"), "-o", str(tmp_path / "m.json")],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert matrix.returncode == 1 and "FSM-1" in matrix.stdout, matrix.stdout + matrix.stderr
