@@ -184,6 +184,31 @@ def test_loose_results_are_learnt() -> None:
     assert is_known(apply("*:f64,f64", 3.0, 0.5))
 
 
+def test_rules_and_bounds_hold() -> None:
+    """What a solver is told of a result that it does not know yet is true of the result."""
+    chance, terms = random.Random(3), Terms()
+    operations, solver = Operations(terms), Solver(Operations(terms), math.inf, True)
+    told = 0
+    for op in all_ops():
+        for _ in range(60 if op.args[0].is_float and op.result.is_float else 0):
+            args = [drawn(chance, type_) for type_ in op.args]
+            if len(args) == 2 and chance.random() < 0.2:
+                args[1] = chance.choice((args[0], -args[0]))
+            unknown = [terms.fresh(type_, "x") for type_ in op.args]
+            before = len(operations.bounds)
+            result, _ = operations.apply(op, unknown)
+            loose = operations.loose.get(result) if not is_known(result) else None
+            if loose is None or loose.op is not op:
+                continue
+            for x, arg, type_ in zip(unknown, args, op.args, strict=True):
+                solver.require(terms.equal(x, arg, type_))
+            solver.require(terms.equal(result, evaluate(op, args), op.result))
+            for fact in [*operations.rules(loose), *operations.bounds[before:]]:
+                solver.require(fact)
+                told += 1
+    assert told > 2000 and solver.may_hold([True])
+
+
 # ---- the answers -----------------------------------------------------------------------------------------------------
 
 PAD = """

@@ -213,7 +213,9 @@ def _add_prove(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         metavar="ID",
         help="a requirement, an assertion or a state; repeat for more",
     )
-    prove.add_argument("--seconds", type=float, default=60.0, metavar="SECONDS", help="time for all of them (default: 60)")
+    prove.add_argument(
+        "--seconds", type=float, default=60.0, metavar="SECONDS", help="time for all of them (default: 60)"
+    )
     prove.add_argument("--depth", type=int, default=24, metavar="N", help="ticks from the beginning (default: 24)")
     prove.add_argument(
         "-o", "--output", type=Path, metavar="FOLDER", help="write a pytest test for each that does not hold"
