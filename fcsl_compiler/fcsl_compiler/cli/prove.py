@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 from ..base.diagnostics import nearest
 from ..base.files import write_whole
 from ..base.usage_error import UsageError
+from ..driver.externs import build_externs
 from ..driver.monitors import compile_monitor
 from ..driver.passes import Compilation, compile_machine
 from ..emit.field_table import source_hash
+from ..reference.externs import externs_of
 
 if TYPE_CHECKING:
     from ..prove.progress import Finding, Progress
@@ -43,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
     compiled = compile_machine(options.config, "", until="lower", requirements=options.requirements)
     compile_monitor(compiled, until="lower")
     try:
-        watched = Watched(compiled)
+        externs = externs_of(build_externs(options.config)) if compiled.checked.externs else None
+        watched = Watched(compiled, externs)
     except StartFaulted as error:
         raise UsageError(f"{options.config}: `start` of `{error.args[0]}` faults: the machine does not begin") from None
     progress = search(watched, _wanted(watched, options.only), options.seconds, options.depth, _tell)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..emit.fault_places import FaultPlaces
@@ -12,10 +12,15 @@ from ..emit.field_table import FieldRow, field_table
 from ..emit.names import sensors
 from ..model.machine import Machine
 from ..model.types import SCALARS
+from ..reference.algorithm import Extern
 from ..reference.machine import ReferenceMachine
 
 _CODES = {"bool": "B", "i32": "i", "i64": "q", "u32": "I", "u64": "Q", "f32": "f", "f64": "d"}
 _CELL = 8
+
+
+#: Makes the callable of a declared extern (reference/externs.py).
+Externs = Callable[[Extern], Callable[..., Any]]
 
 
 class StartFaulted(Exception):
@@ -25,7 +30,7 @@ class StartFaulted(Exception):
 class Flight:
     """A machine in CPython. `lowered`: the same after the pass of that name, for the table of its fault places."""
 
-    def __init__(self, machine: Machine, lowered: Machine):
+    def __init__(self, machine: Machine, lowered: Machine, externs: Externs | None = None):
         self.m, self.rows = machine, {row.path: row for row in field_table(machine)}
         self.layout: dict[str, int] = {}
         at = 0
@@ -39,7 +44,7 @@ class Flight:
             self.layout[path] = at
             at += _CELL
         self.places = [(p.file, p.line, p.column, p.cause) for p in FaultPlaces(lowered).rows]
-        self.reference = ReferenceMachine(machine, self.layout, self.places)
+        self.reference = ReferenceMachine(machine, self.layout, self.places, externs)
         self._faults: dict[str, int] = {}
         self._cells = {
             path: (struct.Struct(_format(row)).unpack_from, self.layout[path], row.abi_type == "FCSL_BOOL")

@@ -42,7 +42,7 @@ Claim = Property | Invariant
 
 class Progress:
     """`deadline`: of time.process_time(). `exact`: of the solvers. `unclear`: properties that got no answer at this
-    exactness; they are not asked again."""
+    exactness; they are not asked again. `slow`: of those the induction is not."""
 
     def __init__(self, watched: Watched, wanted: Iterable[Property], deadline: float):
         self.w, self.deadline = watched, deadline
@@ -52,6 +52,7 @@ class Progress:
         self.t = self.terms.t
         self.exact = False
         self.unclear: set[Property] = set()
+        self.slow: set[Property] = set()
         self.proven: list[Claim] = []
 
     def solver(self) -> Solver:

@@ -39,7 +39,7 @@ def search(
         for p, flight in violated.items():
             progress.refute(p, flight)
         for progress.exact in (False, True):
-            progress.unclear = set()
+            progress.unclear, progress.slow = set(), set()
             _pass(progress, begin, invariants, depth, tell)
     except TimeUp:
         tell("no time is left")

@@ -47,36 +47,40 @@ class Step:
         """Claims that hold always, since they hold in the last tick if they hold in those before: each property alone, then
         with invariants, then all together."""
         left: list[Property] = []
-        for p in properties:
-            found = self._largest([p]) or self._largest([p, *self._near(p, invariants)])
+        for p in (p for p in properties if p not in self.p.slow):
+            found = self._in_time([p], p) or self._in_time([p, *self._near(p, invariants)], p)
             for claim in found:
                 self._require(claim)
             yield from found
-            if p not in found:
-                left.append(p)
+            left += [] if p in found or p in self.p.slow else [p]
         if len(left) > 1:
-            yield from self._largest(left)
+            yield from self._in_time(left, *left)
 
-    def _largest(self, claims: Sequence[Claim]) -> list[Claim]:
-        """The largest part of the claims that proves itself; [] if time runs out."""
+    def _in_time(self, claims: Sequence[Claim], *of: Property) -> list[Claim]:
+        """The largest part that proves itself. Properties for which that takes too long are not asked again."""
+        if not self.p.slow.isdisjoint(of):
+            return []
+        try:
+            return self._largest(claims, time.process_time() + self.p.slice())
+        except TimeUp:
+            self.p.check_time()
+            self.p.slow.update(of)
+            return []
+
+    def _largest(self, claims: Sequence[Claim], until: float) -> list[Claim]:
+        """The largest part of the claims that proves itself; [] if no property is in it. Raises TimeUp."""
         wrong = {claim: self.p.violated(claim, self.moments[-1]) for claim in claims}
         before = {c: [self.t.negation(self.p.violated(c, m)) for m in self.moments[:-1]] for c in claims}
         left = list(claims)
-        try:
-            until = time.process_time() + self.p.slice()
-            while left:
-                conditions = [self.t.any_of(wrong[c] for c in left), *(m for claim in left for m in before[claim])]
-                if not self.solver.may_hold(conditions, until):
-                    return left
-                fails = [c for c in left if self.solver.value(wrong[c], BOOL)]
-                guesses = [c for c in fails if isinstance(c, Invariant)]
-                # A guess goes at the first doubt; for a property the solver learns more before.
-                if guesses or self.solver.learn(conditions):
-                    left = [c for c in left if c not in (guesses or fails)]
-                    if not any(isinstance(c, Property) for c in left):
-                        return []
-        except TimeUp:
-            pass
+        while any(isinstance(c, Property) for c in left):
+            conditions = [self.t.any_of(wrong[c] for c in left), *(m for claim in left for m in before[claim])]
+            if not self.solver.may_hold(conditions, until):
+                return left
+            fails = [c for c in left if self.solver.value(wrong[c], BOOL)]
+            guesses = [c for c in fails if isinstance(c, Invariant)]
+            # A guess goes at the first doubt; for a property the solver learns more before.
+            if guesses or self.solver.learn(conditions):
+                left = [c for c in left if c not in (guesses or fails)]
         return []
 
     # ---- invariants that matter -------------------------------------------------------------------------------------

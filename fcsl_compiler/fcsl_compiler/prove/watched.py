@@ -10,7 +10,7 @@ from typing import Any
 from ..driver.passes import Compilation
 from ..model.types import I32
 from ..requirements.requirement import Requirement
-from .flight import Flight
+from .flight import Externs, Flight
 from .operations import Operations
 from .properties import Property
 from .terms import Value
@@ -32,10 +32,10 @@ Given = tuple[Mapping[str, bool], Mapping[str, Sequence[Any]]]
 class Watched:
     """A compiled machine, until the pass `lower`, and its monitor. Raises StartFaulted."""
 
-    def __init__(self, compiled: Compilation):
+    def __init__(self, compiled: Compilation, externs: Externs | None = None):
         assert compiled.lowered is not None
         self.machine, self.requirements = compiled.checked, list(compiled.requirements)
-        self.flight = Flight(compiled.checked, compiled.lowered)
+        self.flight = Flight(compiled.checked, compiled.lowered, externs)
         self.monitor_flight: Flight | None = None
         self.observed: tuple[tuple[str, str], ...] = ()
         if compiled.monitor is not None:
