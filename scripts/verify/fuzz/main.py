@@ -80,7 +80,7 @@ def compiled(source: Path, includes: Sequence[Path], more: Sequence[str] = ()) -
 
 def linked(output: Path, parts: Sequence[Path], flags: Sequence[str]) -> Path:
     """A program or library of objects and archives; the one that was made of the same parts before is used again."""
-    line = [CLANG, f"-fsanitize={SANITIZE}", *flags, *map(str, parts)]
+    line = [CLANG, "-fuse-ld=lld", f"-fsanitize={SANITIZE}", *flags, *map(str, parts)]
     stamp = output.with_suffix(".parts")
     wanted = " ".join([*line, *(str(p.stat().st_mtime_ns) for p in parts)])
     if not output.exists() or not stamp.exists() or stamp.read_text() != wanted:
