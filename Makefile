@@ -22,7 +22,7 @@ demo: ## the whole promise on the lander: compile, fly, ROS 2, record, replay, l
 	@scripts/setup.sh fcsl_bridge lander ahrs
 	@$(ENV) python3 scripts/demo.py
 
-test: setup lint ## lint, every package's tests, then those that cross packages; CHANGED=origin/main: what differs from there
+test: setup ## lint, every package's tests, then those that cross packages; CHANGED=origin/main: what differs from there
 	@scripts/test.sh $(CHANGED)
 
 wheels: setup ## one wheel, out/wheels/fcsl-….whl, for any x86-64 Linux with glibc 2.28: FCSL without ROS and without this workspace

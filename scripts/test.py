@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The second half of `make test`: each package's tests by `colcon test`, and test/, whose tests cross packages. Exit status 1 if
-anything failed.
+"""The second half of `make test`: `make lint`, each package's tests by `colcon test`, and test/, whose tests cross packages. Exit
+status 1 if anything failed.
 
     python3 scripts/test.py [BASE]    of the packages' tests only those that a change since commit BASE touches
 
@@ -26,6 +26,8 @@ AT_ONCE = 2
 LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_blocks", "fcsl_sim", "fcsl_hal")
 RESULTS = ROOT / "build"
 WORKSPACE_RESULTS = RESULTS / "workspace_tests.xml"
+#: On one core, beside tests. `make test` has set up.
+LINT = Job("lint", ("make", "-o", "setup", "lint"))
 #: Upper bound of a run, seconds.
 LIMIT_S = 4800.0
 #: How much of the message of a failed test is shown, in lines and in characters a line.
@@ -109,7 +111,7 @@ def main() -> int:
     for file in result_files():  # those of an earlier run must not count
         file.unlink()
     try:
-        failed_jobs = run_all(longest_first(packages), AT_ONCE, LIMIT_S)
+        failed_jobs = run_all([LINT, *longest_first(packages)], AT_ONCE, LIMIT_S)
     except KeyboardInterrupt:
         say("interrupted")
         return 130
