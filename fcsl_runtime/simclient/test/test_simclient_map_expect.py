@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from foreign_bags import MS, header, imu, make, number, quaternion, vector, write
 
+from fcsl_compiler.cli.fcsl import main
 from simclient import MapError
 from simclient.bag import columns
 from simclient.machine_build import build_config
@@ -371,7 +371,7 @@ def test_states_are_compared_as_text(run: Runs) -> None:
     assert str(done).splitlines()[-2].split()[:3] == ["machine.state", "state", "3"]
 
 
-def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path) -> None:
+def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write(
         tmp_path / "bag",
         {
@@ -382,20 +382,23 @@ def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(SPEED.removesuffix("expect:\n"))
     expect = tmp_path / "expect.yaml"
 
-    def command(*more: str | Path) -> subprocess.CompletedProcess[str]:
-        line = ["fcsl", "replay", bag, "--library", vehicle, "--map", tmp_path / "map.yaml"]
-        done = subprocess.run([*map(str, [*line, *more])], capture_output=True, text=True)
-        assert "Traceback" not in done.stderr, done.stderr
-        return done
+    def command(*more: str | Path) -> tuple[int | str | None, str, str]:
+        """Status, output and errors of `fcsl replay`."""
+        line = ["replay", bag, "--library", vehicle, "--map", tmp_path / "map.yaml"]
+        try:
+            status: int | str | None = main([*map(str, [*line, *more])])
+        except SystemExit as end:
+            status = end.code
+        return (status, *capsys.readouterr())
 
     entry = "expect:\n  adder.outputs.%s: {topic: /double, field: data, abs: 0.5}\n"
     expect.write_text(entry % "total")
-    done = command("--expect", expect, "--plot", tmp_path / "p.png")
-    assert (done.returncode, done.stderr) == (0, "") and "adder.outputs.total" in done.stdout
+    status, out, err = command("--expect", expect, "--plot", tmp_path / "p.png")
+    assert (status, err) == (0, "") and "adder.outputs.total" in out
     assert (tmp_path / "p.png").read_bytes()[:4] == b"\x89PNG"
     expect.write_text(entry.replace("abs", "scale: 2, abs") % "twice")
-    done = command("--expect", expect)
-    assert done.returncode == 1 and done.stdout.splitlines()[-2].split()[-3:] == ["15", "0.030000", "s"]
+    status, out, _ = command("--expect", expect)
+    assert status == 1 and out.splitlines()[-2].split()[-3:] == ["15", "0.030000", "s"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bag", "expect.yaml", "map.yaml", "p.png"]
 
     for text, reason in {
@@ -411,9 +414,9 @@ def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path) -> None:
         "expect:\n  machine.state: {topic: /double, field: data, abs: 1}": "states are compared as text",
     }.items():
         expect.write_text(text)
-        done = command("--expect", expect)
-        assert done.returncode == 2 and reason in done.stderr, (text, done.stderr)
-    done = command("--plot", tmp_path / "p.png")
-    assert done.returncode == 2 and "nothing is expected" in done.stderr
-    done = command("--plot", tmp_path / "p.txt")
-    assert done.returncode == 2 and "ends in .png" in done.stderr
+        status, _, err = command("--expect", expect)
+        assert status == 2 and reason in err, (text, err)
+    status, _, err = command("--plot", tmp_path / "p.png")
+    assert status == 2 and "nothing is expected" in err
+    status, _, err = command("--plot", tmp_path / "p.txt")
+    assert status == 2 and "ends in .png" in err
