@@ -15,7 +15,8 @@ from typing import Any
 
 from ..emit.field_table import FieldRow
 from ..model.literals import round_f32
-from ..model.types import BOOL, F32, HEALTH, HEALTH_NAMES, I32, Scalar
+from ..model.machine import Machine
+from ..model.types import BOOL, F32, HEALTH, HEALTH_NAMES, I32, Scalar, leaves
 from .properties import Property
 from .terms import Value
 from .tick import OF_ABI, Fields, host_fields
@@ -143,6 +144,16 @@ class _Inputs:
         return self.chance.randrange(len(HEALTH_NAMES) if type_ is HEALTH else len(self.w.machine.requests) + 1)
 
 
+def _fed(machine: Machine) -> set[str]:
+    """Inputs that are copied in the tick in which they are read: their sources say the same."""
+    found = {f"{machine.instances[w.instance].name}.inputs.{w.input}" for w in machine.watched}
+    for c in machine.connections:
+        if not c.delayed:
+            path = f"{machine.instances[c.target.instance].name}.inputs.{c.target.path}"
+            found |= {path + leaf.path for leaf in leaves(c.target.type)}
+    return found
+
+
 class _Seen:
     """The values that fields had in flights."""
 
@@ -192,7 +203,7 @@ class _Seen:
                     yield Invariant("is", f, values[0], state)
             if f.type is BOOL:
                 flags.append((f, whole))
-            elif f.type.is_integer and f.path != "machine.tick":
+            elif f.type.is_integer and not f.path.startswith("machine."):
                 yield Invariant("least", f, min(whole))
                 yield Invariant("most", f, max(whole))
         for (a, of_a), (b, of_b) in itertools.combinations(flags[:_FLAGS_MAX], 2):
@@ -201,8 +212,7 @@ class _Seen:
                 if (one, other) not in pairs:
                     yield Invariant("implies", a, (one, not other), other=b)
 
-    @staticmethod
-    def _of_float(f: Field, values: tuple[float, ...]) -> Iterator[Invariant]:
+    def _of_float(self, f: Field, values: tuple[float, ...]) -> Iterator[Invariant]:
         if any(map(math.isnan, values)):
             return
         if len(set(values)) == 1:
@@ -212,6 +222,15 @@ class _Seen:
             yield Invariant("least", f, 0.0)
         if high <= 1.0:
             yield Invariant("most", f, 1.0)
+        own = self._parameters(f)
+        yield from (Invariant("least", f, p) for p in own if p <= low)
+        yield from (Invariant("most", f, p) for p in own if p >= high)
         if math.isfinite(low) and math.isfinite(high):
             yield Invariant("least", f, -sys.float_info.max)
             yield Invariant("most", f, sys.float_info.max)
+
+    def _parameters(self, f: Field) -> list[float]:
+        """Values of the float parameters of the instance that has a field: its bounds may be among them."""
+        instance = self.w.machine.instances[self.w.flight.rows[f.path].instance] if not f.of_monitor else None
+        given = instance.parameters.values() if instance is not None else ()
+        return list({float(v) for values in given for v in values if isinstance(v, float) and math.isfinite(v)})

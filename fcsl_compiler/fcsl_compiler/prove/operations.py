@@ -198,10 +198,12 @@ class Operations:
             found = [implies(Kind.FP_GEQ, *strict), implies(Kind.FP_GEQ, *below)]
             found += [implies(Kind.FP_LEQ, strict[0], below[1]), implies(Kind.FP_LEQ, below[0], strict[1])]
             one = self.t.term(1.0, type_)
-            small = make(Kind.FP_LEQ, b, one) if name == "*" else make(Kind.FP_GEQ, b, one)
-            small = make(Kind.AND, small, positive[1])
-            found.append(make(Kind.OR, is_nan, make(Kind.NOT, small), negative[0], make(Kind.FP_LEQ, r, a)))
-            found.append(make(Kind.OR, is_nan, make(Kind.NOT, small), positive[0], make(Kind.FP_GEQ, r, a)))
+            factors = ((a, b, 0, 1), (b, a, 1, 0)) if name == "*" else ((a, b, 0, 1),)
+            for whole, factor, of_whole, of_factor in factors:
+                small = make(Kind.FP_LEQ if name == "*" else Kind.FP_GEQ, factor, one)
+                outside = [make(Kind.NOT, small), make(Kind.NOT, positive[of_factor])]
+                found.append(make(Kind.OR, is_nan, *outside, negative[of_whole], make(Kind.FP_LEQ, r, whole)))
+                found.append(make(Kind.OR, is_nan, *outside, positive[of_whole], make(Kind.FP_GEQ, r, whole)))
         return [make(Kind.IFF, is_nan, make(Kind.OR, *nan)), *found]
 
     def _test(self, name: str, x: Term) -> Term:

@@ -70,12 +70,16 @@ class Progress:
 
     def check_time(self) -> None:
         """Raises TimeUp."""
-        if time.process_time() > self.deadline:
+        if self.left() < 0.0:
             raise TimeUp
 
+    def left(self) -> float:
+        """Seconds."""
+        return self.deadline - time.process_time()
+
     def slice(self) -> float:
-        """Seconds for one question: a fair part of what is left."""
-        return max(1.0, (self.deadline - time.process_time()) / (4 + len(self.open())))
+        """Seconds for one simple question: so that each of several about all open properties can be asked."""
+        return max(0.5, self.left() / (8 * (1 + len(self.open()))))
 
     # ---- answers ----------------------------------------------------------------------------------------------------
 

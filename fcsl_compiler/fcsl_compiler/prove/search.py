@@ -30,17 +30,20 @@ def search(
 ) -> Progress:
     """Answers about the wanted properties, in so many seconds of computing for all of them. `depth`: most ticks from the
     beginning. `tell` gets a line about what is going on."""
-    begun = time.process_time()
-    progress = Progress(watched, wanted, begun + seconds)
+    progress = Progress(watched, wanted, time.process_time() + seconds)
     try:
         watched.begin()
         begin = progress.terms.beginning()
-        invariants, violated = suggest(watched, progress.open(), begun + _FLIGHTS * seconds)
+        _pass(progress, begin, [], 1, tell)  # much needs no more
+        progress.unclear, progress.slow = set(), set()
+        if not progress.open():
+            return progress
+        invariants, violated = suggest(watched, progress.open(), time.process_time() + _FLIGHTS * progress.left())
         for p, flight in violated.items():
             progress.refute(p, flight)
         for progress.exact in (False, True):
-            progress.unclear, progress.slow = set(), set()
             _pass(progress, begin, invariants, depth, tell)
+            progress.unclear, progress.slow = set(), set()
     except TimeUp:
         tell("no time is left")
     return progress

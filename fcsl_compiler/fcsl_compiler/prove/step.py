@@ -46,22 +46,26 @@ class Step:
     def proven(self, properties: list[Property], invariants: list[Invariant]) -> Iterator[Claim]:
         """Claims that hold always, since they hold in the last tick if they hold in those before: each property alone, then
         with invariants, then all together."""
-        left: list[Property] = []
-        for p in (p for p in properties if p not in self.p.slow):
-            found = self._in_time([p], p) or self._in_time([p, *self._near(p, invariants)], p)
-            for claim in found:
-                self._require(claim)
-            yield from found
-            left += [] if p in found or p in self.p.slow else [p]
-        if len(left) > 1:
-            yield from self._in_time(left, *left)
+        asked = sorted((p for p in properties if p not in self.p.slow), key=self._arithmetic)
+        for nearby in (False, True):
+            for p in list(asked):
+                claims = [p, *(self._near(p, invariants) if nearby else ())]
+                found = self._in_time(claims, self.p.left() / 4 if nearby else self.p.slice(), p)
+                for claim in found:
+                    self._require(claim)
+                yield from found
+                asked = [a for a in asked if a not in found and (a not in self.p.slow or not nearby)]
+        if len(asked) > 1:
+            yield from self._in_time(asked, self.p.slice(), *asked)
 
-    def _in_time(self, claims: Sequence[Claim], *of: Property) -> list[Claim]:
+    def _arithmetic(self, p: Property) -> int:
+        """How much float arithmetic it rests on. What rests on little is proved first."""
+        return len(self.p.operations.loose.keys() & self._constants([self.p.violated(p, self.moments[-1])]))
+
+    def _in_time(self, claims: Sequence[Claim], seconds: float, *of: Property) -> list[Claim]:
         """The largest part that proves itself. Properties for which that takes too long are not asked again."""
-        if not self.p.slow.isdisjoint(of):
-            return []
         try:
-            return self._largest(claims, time.process_time() + self.p.slice())
+            return self._largest(claims, time.process_time() + seconds)
         except TimeUp:
             self.p.check_time()
             self.p.slow.update(of)
