@@ -156,8 +156,13 @@ class Pair:
         whole, part = self.whole._save(), self.part._save()
         for path in self.kept:
             ours, theirs = self.part.machine.fields[path], self.whole.machine.fields[path]
-            expected = whole[theirs.offset : theirs.offset + theirs.size]
-            assert part[ours.offset : ours.offset + ours.size] == expected, (path, self.whole.get_value("machine.tick"))
+            found, expected = part[ours.offset :][: ours.size], whole[theirs.offset :][: theirs.size]
+            tick = self.whole.get_value("machine.tick")
+            if path.endswith(".counters.fault_place"):  # each machine numbers its own
+                instance = path.removesuffix(".counters.fault_place")
+                assert self.part.last_fault(instance) == self.whole.last_fault(instance), (path, tick)
+            else:
+                assert found == expected, (path, tick)
 
     def _disturb(self) -> None:
         for field in self.whole.machine.fields.values():
