@@ -315,6 +315,29 @@ def test_a_machine(tmp_path: Path) -> None:
     }
 
 
+def test_times(tmp_path: Path) -> None:
+    """Requirements that keep ticks are proven by what counts them: here the time of a timed transition."""
+    edges = json.loads(pad(tmp_path).read_text())["transitions"]
+    edges.append({"from": "FIRING", "to": "SAFE", "after_s": 2.0, "priority": 1})
+    requirements = [
+        {"id": "T-1", "text": "It fires for 2 s at most.", "never": "held(machine.state == 'FIRING', 2.1)"},
+        {"id": "T-2", "text": "It fires for 1.8 s at most.", "never": "held(machine.state == 'FIRING', 1.9)"},
+        {
+            "id": "T-3",
+            "text": "It ends 2 s after it began.",
+            "then": "within(rose(machine.state == 'FIRING'), machine.state != 'FIRING', 2.0)",
+        },
+        {
+            "id": "T-4",
+            "text": "Without an abort it fires for 2 s.",
+            "when": "fell(machine.state == 'FIRING') and machine.state != 'ABORTED'",
+            "then": "previous(held(machine.state == 'FIRING', 1.9))",
+        },
+    ]
+    found = answers(pad(tmp_path, transitions=edges, requirements=requirements), "T-1", "T-2", "T-3", "T-4")
+    assert [str(found[f"T-{n}"].answer) for n in range(1, 5)] == ["proven", "refuted", "proven", "proven"]
+
+
 #: Defects of the machine, and what no longer holds with each.
 _DEFECTS = {
     "PAD-3": {"0.0, 1.0) if": "0.0, 1.5) if"},

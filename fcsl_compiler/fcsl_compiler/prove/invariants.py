@@ -16,7 +16,7 @@ from typing import Any
 from ..emit.field_table import FieldRow
 from ..model.literals import round_f32
 from ..model.machine import Machine
-from ..model.types import BOOL, F32, HEALTH, HEALTH_NAMES, I32, Scalar, leaves
+from ..model.types import BOOL, F32, HEALTH, HEALTH_NAMES, I32, I64, U64, Scalar, leaves
 from .properties import Property
 from .terms import Value
 from .tick import OF_ABI, Fields, host_fields
@@ -25,6 +25,8 @@ from .watched import Given, Moment, Watched, WatchedTerms
 _FLIGHTS, _TICKS = 24, 120
 #: Longer fields are not looked at, and of more flags not all pairs.
 _ELEMENTS_MAX, _FLAGS_MAX = 6, 48
+#: Of fields that may count ticks so many are tried, and how exactly they do.
+_COUNTS_MAX, _SLACK = 16, 2
 _LOSING = 0.25  # of the flights lose samples
 #: Draws of inputs for one tick until one violates no assumption.
 _ATTEMPTS = 20
@@ -50,8 +52,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Invariant:
-    """`kind`: "is" (a value), "least", "most" (a bound), "implies" (a flag another one). `state`: only while this state is
-    active; -1 in all."""
+    """`kind`: "is" (a value), "least", "most" (a bound), "implies" (a flag another one), "since" (a field that keeps a tick
+    lies, unless it is -1, as far behind the machine's tick as `other` counts, apart from the two differences of `value`).
+    `state`: only while this state is active; -1 in all."""
 
     kind: str
     field: Field
@@ -70,13 +73,24 @@ class Invariant:
             one, other = self.value
             ends = (own if one else t.negation(own), self.other.value(moment))
             return t.any_of((t.negation(ends[0]), ends[1] if other else t.negation(ends[1])))
-        if self.kind == "is":
+        if self.kind == "since":
+            found = self._since(terms, moment)
+        elif self.kind == "is":
             found = t.equal(own, self.value, self.field.type)
         else:
             found = terms.machine.compare(">=" if self.kind == "least" else "<=", own, self.value, self.field.type)
         if self.state < 0:
             return found
         return t.any_of((t.negation(t.equal(moment.tick.fields["machine.state"][0], self.state, I32)), found))
+
+    def _since(self, terms: WatchedTerms, moment: Moment) -> Value:
+        m, kept = terms.machine, self.field.value(moment)
+        ago = m.apply("wrap_sub", I64, m.signed(moment.tick.fields["machine.tick"][0], U64), kept)
+        count = 0 if self.other is None else m.signed(self.other.value(moment), self.other.type)
+        rest = m.apply("wrap_sub", I64, ago, count)
+        low, high = self.value
+        inside = terms.t.all_of((m.compare(">=", rest, low, I64), m.compare("<=", rest, high, I64)))
+        return terms.t.any_of((terms.t.equal(kept, -1, I64), inside))
 
 
 def suggest(
@@ -201,16 +215,35 @@ class _Seen:
             for state, values in of.items():
                 if len(of) > 1 and len(set(values)) == 1:
                     yield Invariant("is", f, values[0], state)
+                elif len(of) > 1 and f.type.is_integer:
+                    yield Invariant("least", f, min(values), state)
+                    yield Invariant("most", f, max(values), state)
             if f.type is BOOL:
                 flags.append((f, whole))
             elif f.type.is_integer and not f.path.startswith("machine."):
                 yield Invariant("least", f, min(whole))
                 yield Invariant("most", f, max(whole))
+        for state, found in columns.items():
+            yield from self._since(state if len(columns) > 1 else -1, found)
         for (a, of_a), (b, of_b) in itertools.combinations(flags[:_FLAGS_MAX], 2):
             pairs = set(zip(of_a, of_b, strict=True))
             for one, other in itertools.product((False, True), repeat=2):
                 if (one, other) not in pairs:
                     yield Invariant("implies", a, (one, not other), other=b)
+
+    def _since(self, state: int, columns: Sequence[tuple[Any, ...]]) -> Iterator[Invariant]:
+        """Of the ticks that requirements keep, and all that counts."""
+        numbered = list(enumerate(self.fields))
+        (ticks,) = (columns[n] for n, f in numbered if f.path == "machine.tick" and not f.of_monitor)
+        keep = [(n, f) for n, f in numbered if f.of_monitor and f.type is I64 and ".state." in f.path]
+        count = [(n, f) for n, f in numbered if not f.of_monitor and f.type.is_integer and f.path != "machine.tick"]
+        moving = [(n, f) for n, f in count if len(set(columns[n])) > 1][:_COUNTS_MAX]
+        for n, f in keep:
+            ago = [tick - kept if kept != -1 else None for tick, kept in zip(ticks, columns[n], strict=True)]
+            for other, values in ((None, itertools.repeat(0)), *((g, columns[k]) for k, g in moving)):
+                rest = [a - value for a, value in zip(ago, values, strict=False) if a is not None]
+                if rest and max(rest) - min(rest) <= _SLACK:
+                    yield Invariant("since", f, (min(rest), max(rest)), state, other)
 
     def _of_float(self, f: Field, values: tuple[float, ...]) -> Iterator[Invariant]:
         if any(map(math.isnan, values)):

@@ -19,7 +19,7 @@ from ..emit.names import sensors
 from ..model import ir
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef
 from ..model.ops import find
-from ..model.types import BOOL, F64, HEALTH, I32, REQUEST, SCALARS, U32, U64, Scalar, Type, leaves
+from ..model.types import BOOL, F64, HEALTH, I32, I64, REQUEST, SCALARS, U32, U64, Scalar, Type, leaves
 from .execute import Executor, TooLarge, Values, Variable, scalars_of
 from .operations import Operations
 from .properties import ASSERTION
@@ -213,7 +213,7 @@ class MachineTerms:
             return True
         type_ = U32 if "phase" in fields else U64
         (tick,) = fields.get("phase", fields["machine.tick"])
-        return self.t.equal(self._apply("%", type_, tick, entry.divisor), entry.phase, type_)
+        return self.t.equal(self.apply("%", type_, tick, entry.divisor), entry.phase, type_)
 
     def _copy(self, fields: Fields, connection: Connection, condition: Value) -> None:
         source, target = connection.source, connection.target
@@ -349,9 +349,9 @@ class MachineTerms:
         if source.field == "ticks_in_state":
             return fields["machine.ticks_in_state"][0]
         if source.field == "time_ns":
-            whole = self._apply("*", U64, self._apply("//", U64, tick, hz), 1_000_000_000)
-            rest = self._apply("//", U64, self._apply("*", U64, self._apply("%", U64, tick, hz), 1_000_000_000), hz)
-            return self._convert("wrap_i64", U64, self._plus(whole, rest, U64))
+            whole = self.apply("*", U64, self.apply("//", U64, tick, hz), 1_000_000_000)
+            rest = self.apply("//", U64, self.apply("*", U64, self.apply("%", U64, tick, hz), 1_000_000_000), hz)
+            return self.signed(self._plus(whole, rest, U64), U64)
         period: Value = 0.0
         for n, entry in entries.items():
             period = self.t.choose(made.active[n], entry.divisor / hz, period, F64)
@@ -360,8 +360,8 @@ class MachineTerms:
         resumed = self.t.negation(fields[f"{name}.counters.completed"][0])
         if source.field == "resumed":
             return resumed
-        ticks = self._apply("-", U64, self._plus(tick, 1, U64), fields[f"{name}.counters.last_run"][0])
-        since = self._apply("/", F64, self._convert("f64", U64, ticks), float(hz))
+        ticks = self.apply("-", U64, self._plus(tick, 1, U64), fields[f"{name}.counters.last_run"][0])
+        since = self.apply("/", F64, self.apply("f64", U64, ticks), float(hz))
         return self.t.choose(resumed, period, since, F64)
 
     # ---- the end of a tick ------------------------------------------------------------------------------------------
@@ -419,21 +419,20 @@ class MachineTerms:
 
     # ---- operations -------------------------------------------------------------------------------------------------
 
-    def _apply(self, symbol: str, type_: Scalar, *args: Value) -> Value:
+    def apply(self, symbol: str, type_: Scalar, *args: Value) -> Value:
         op = find(symbol, (type_,) * len(args))
         assert op is not None
         return self.o.apply(op, args)[0]
 
     def compare(self, symbol: str, a: Value, b: Value, type_: Scalar) -> Value:
-        return self._apply(symbol, type_, a, b)
+        return self.apply(symbol, type_, a, b)
 
     def _plus(self, a: Value, b: Value, type_: Scalar) -> Value:
-        return self._apply("+", type_, a, b)
+        return self.apply("+", type_, a, b)
 
-    def _convert(self, name: str, type_: Scalar, value: Value) -> Value:
-        op = find(name, (type_,))
-        assert op is not None
-        return self.o.apply(op, (value,))[0]
+    def signed(self, value: Value, type_: Scalar) -> Value:
+        """An integer as an i64, modulo 2^64."""
+        return value if type_ is I64 else self.apply("wrap_i64", type_, value)
 
 
 def host_fields(machine: Machine, sampled: bool = False) -> list[FieldRow]:
