@@ -25,6 +25,7 @@ from fcsl_compiler.driver.passes import Compilation, compile_machine
 from fcsl_compiler.model.literals import round_f32
 from fcsl_compiler.model.ops import all_ops
 from fcsl_compiler.model.types import BOOL, F32, F64, HEALTH, REQUEST, Scalar
+from fcsl_compiler.prove import execute
 from fcsl_compiler.prove.evaluate import Faulted, evaluate
 from fcsl_compiler.prove.flight import Flight, StartFaulted
 from fcsl_compiler.prove.operations import Operations
@@ -336,6 +337,13 @@ def test_times(tmp_path: Path) -> None:
     ]
     found = answers(pad(tmp_path, transitions=edges, requirements=requirements), "T-1", "T-2", "T-3", "T-4")
     assert [str(found[f"T-{n}"].answer) for n in range(1, 5)] == ["proven", "refuted", "proven", "proven"]
+
+
+def test_what_is_not_looked_into_may_do_anything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also fail its assertions."""
+    monkeypatch.setattr(execute, "OPERATIONS_MAX", 10)
+    found = answers(pad(tmp_path), "PAD-1", "PAD-4", "sequence pad.py:16:9", seconds=4.0)
+    assert {str(f.answer) for f in found.values()} == {"open"}
 
 
 #: Defects of the machine, and what no longer holds with each.
