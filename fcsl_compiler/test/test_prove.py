@@ -404,6 +404,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     ("arguments", "text"),
     [
         (["--only", "PAD-77"], "`PAD-77` is no requirement that ticks can violate"),
+        (["--only", "PAD-7"], "`PAD-7` is an assumption: there is nothing to prove in every tick"),
         (["--seconds", "0"], "--seconds and --depth are positive"),
         (["--depth", "0"], "--seconds and --depth are positive"),
     ],

@@ -70,7 +70,12 @@ def _wanted(watched: Watched, only: Sequence[str]) -> list[Property]:
 
     every = list(properties_of(watched.machine, watched.requirements))
     known = [p.id for p in every]
+    if not known:
+        raise UsageError(f"nothing to prove: `{watched.machine.name}` has no requirement, no assertion and one state")
+    others = {r.id: "an assumption" if r.assumed else "judged by the last tick alone" for r in watched.requirements}
     for name in only:
+        if name not in known and name in others:
+            raise UsageError(f"`{name}` is {others[name]}: there is nothing to prove in every tick")
         if name not in known:
             hint = nearest(name, known) or f"there are {', '.join(known) or 'none'}"
             raise UsageError(f"`{name}` is no requirement that ticks can violate, no assertion and no state; {hint}")
