@@ -27,6 +27,7 @@ _FLIGHTS, _TICKS = 24, 120
 _ELEMENTS_MAX, _FLAGS_MAX = 6, 48
 #: Of fields that may count ticks so many are tried, and how exactly they do.
 _COUNTS_MAX, _SLACK = 16, 2
+_LARGEST_F32 = float(2**128 - 2**104)
 _LOSING = 0.25  # of the flights lose samples
 #: Draws of inputs for one tick until one violates no assumption.
 _ATTEMPTS = 20
@@ -106,7 +107,7 @@ def suggest(
         chance = random.Random(number)
         watched.begin()
         flight: list[Given] = []
-        inputs = _Inputs(watched, chance, loses=number < _LOSING * _FLIGHTS)
+        inputs = RandomInputs(watched, chance, loses=number < _LOSING * _FLIGHTS)
         for _ in range(_TICKS):
             given = inputs.tick()
             if given is None:
@@ -119,7 +120,7 @@ def suggest(
     return list(seen.invariants()), violated
 
 
-class _Inputs:
+class RandomInputs:
     """Random inputs that often stay."""
 
     def __init__(self, watched: Watched, chance: random.Random, loses: bool):
@@ -259,11 +260,13 @@ class _Seen:
         yield from (Invariant("least", f, p) for p in own if p <= low)
         yield from (Invariant("most", f, p) for p in own if p >= high)
         if math.isfinite(low) and math.isfinite(high):
-            yield Invariant("least", f, -sys.float_info.max)
-            yield Invariant("most", f, sys.float_info.max)
+            most = _LARGEST_F32 if f.type is F32 else sys.float_info.max
+            yield Invariant("least", f, -most)
+            yield Invariant("most", f, most)
 
     def _parameters(self, f: Field) -> list[float]:
         """Values of the float parameters of the instance that has a field: its bounds may be among them."""
         instance = self.w.machine.instances[self.w.flight.rows[f.path].instance] if not f.of_monitor else None
         given = instance.parameters.values() if instance is not None else ()
-        return list({float(v) for values in given for v in values if isinstance(v, float) and math.isfinite(v)})
+        found = {v for values in given for v in values if isinstance(v, float) and math.isfinite(v)}
+        return [v for v in sorted(found) if f.type is not F32 or round_f32(v) == v]
