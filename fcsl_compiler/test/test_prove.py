@@ -400,6 +400,15 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert '@pytest.mark.violates("PAD-6")' in written and "panel.outputs.abort" in written
 
 
+def test_a_written_test_without_inputs(tmp_path: Path) -> None:
+    """What stays as it begins is not written; without inputs, the twin only ticks."""
+    late = {"id": "PAD-9", "text": "Early.", "then": "machine.tick < 3"}
+    path = pad(tmp_path, requirements=[late])
+    assert main(["prove", str(path), "--only", "PAD-9", "-o", str(tmp_path / "found")]) == 1
+    written = (tmp_path / "found" / "test_pad_9.py").read_text()
+    assert "twin.tick(3)" in written and "inject" not in written
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -29,11 +29,7 @@ import pytest
 
 {mark}def test_{name}(fcsl):
     twin = fcsl({config!r})
-    twin.inject(
-        {{
-{profile}
-        }}
-    )
+    {run}
     {check}
 '''
 
@@ -96,6 +92,8 @@ def test_of(watched: Watched, violated: Property, flight: Sequence[Given], confi
     rows = {row.path: row for row in host_fields(machine, sampled=True)}
     if any(path not in rows for path in by_port):
         return ""
+    ids = ", ".join(f'"{id_}"' for id_ in watched.violated_requirements())
+    watched.begin()
     lines: list[str] = []
     for path, row in rows.items():
         values = [_written(machine, row, given[path]) for _, given in flight]
@@ -106,18 +104,17 @@ def test_of(watched: Watched, violated: Property, flight: Sequence[Given], confi
             mask = f", mask=[np.full({row.shape}, m) for m in {missing}]" if any(missing) and row.shape else mask
             array = "np.ma.array" if mask else "np.array"
             lines.append(f"            {name!r}: {array}([{', '.join(values)}]{mask}),")
-        elif any(float(v) != 0.0 for _, given in flight for v in given[path]):
+        elif any(repr(tuple(given[path])) != repr(watched.flight.read(path)) for _, given in flight):
             lines.append(f"            {path!r}: np.array([{', '.join(values)}]),")
-    if not lines:
-        lines.append("            # no inputs matter")
-    ids = ", ".join(f'"{id_}"' for id_ in watched.violated_requirements())
+    profile = "\n".join(["twin.inject(", "        {", *lines, "        }", "    )"])
     fields = {
         "title": f"{violated}: {violated.text}".replace('"', "'").replace("\\", "/"),
         "mark": f"@pytest.mark.violates({ids})\n" if ids else "",
         "name": re.sub(r"\W+", "_", f"violates_{violated}".lower()).strip("_"),
+        "run": profile if lines else f"twin.tick({len(flight)})",
         "check": _check(violated, len(flight)),
     }
-    return _TEST.format(**fields, config=str(config.resolve()), profile="\n".join(lines))
+    return _TEST.format(**fields, config=str(config.resolve()))
 
 
 def _check(violated: Property, ticks: int) -> str:
