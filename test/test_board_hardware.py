@@ -22,12 +22,14 @@ from fcsl_compiler.driver.cache import build_machine
 from simclient.replay import replay
 
 HZ = 100
-#: Lines of a chip in a file of characters, `0` or `1`; `?` is not told.
+#: Lines of a chip in a file of characters, `0` or `1`; `?` is not told. With another file beside it, one asks for the end of the
+#: flight when it is opened.
 DRIVERS = r"""
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -56,10 +58,15 @@ static fcsl_driver_status_t probe(const char *device, char *why, size_t size)
 static fcsl_driver_status_t open_chip(void *self, const char *device, const uint8_t *used, char *why, size_t size)
 {
     chip_t *chip = self;
+    char signal[256];
     (void)why;
     (void)size;
     memcpy(chip->used, used, sizeof chip->used);
     chip->file = device;
+    (void)snprintf(signal, sizeof signal, "%s.signal", device);
+    if (access(signal, F_OK) == 0) {
+        (void)kill(getpid(), SIGTERM);
+    }
     return FCSL_DRIVER_OK;
 }
 
@@ -233,6 +240,13 @@ def test_safe_levels_come_before_the_first_tick(board: Board, fly: Callable[...,
     flight = fly("--paused")
     until(lambda: board.lamps.read_text() == "01")
     flight.end()
+
+
+def test_a_signal_while_devices_are_opened_ends_the_flight_in_order(board: Board) -> None:
+    Path(f"{board.lamps}.signal").touch()
+    done = subprocess.run(board.line(), env=board.environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done
+    assert board.lamps.read_text() == "01"
 
 
 def test_a_lost_device_fails_its_reads_and_comes_back(board: Board, fly: Callable[..., Flight]) -> None:

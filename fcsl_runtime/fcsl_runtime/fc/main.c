@@ -161,11 +161,11 @@ static int open_server(program_t *program)
 }
 
 /* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. Where nothing is
- * waited for, a signal waits for the monitor. */
+ * waited for, a signal waits for the monitor: outputs that have their safe levels are closed in order. */
 static int open_hal(program_t *program, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &program->loop.hal;
-    if (program->options.peer == NULL) {
+    if (program->options.peer == NULL || options_hal_is_linux(&program->options)) {
         return hal->open(hal, error);
     }
     monitor_let_signals(&program->monitor);
