@@ -32,8 +32,11 @@ from simclient.errors import MapError, TwinError, ViewError
 
 from ..errors import BridgeError, Stopped
 from ..loopback import loopback_environment
+from .node_logger import NodeLogger
 
 _MATCH_POLL_S = 0.02
+#: How long the end of a node waits for those who listen to /rosout.
+_LAST_WORDS_S = 2.0
 #: Parameters that rclpy itself declares.
 _DESCRIBES_TYPES = "start_type_description_service"
 _ROS_PARAMETERS = ("use_sim_time", _DESCRIBES_TYPES, "qos_overrides")
@@ -89,7 +92,7 @@ def run_node(
     `-h` and `--help` print the options, `--version` name and version, and do nothing else.
     """
     stop = Stop()
-    node = None
+    node = logger = None
     try:
         if any(word in ("-h", "--help") for word in sys.argv[1:]):
             print(_help(name, options), flush=True)
@@ -111,7 +114,9 @@ def run_node(
             automatically_declare_parameters_from_overrides=True,
             start_parameter_services=parameter_services,
             parameter_overrides=list(given.values()),
+            enable_rosout=False,
         )
+        logger = NodeLogger(node)
         status = body(node, stop)
         sys.stdout.flush()
         return status
@@ -130,6 +135,8 @@ def run_node(
         # The end of one node makes a launch file interrupt the others, which may have just ended, too. Python keeps this
         # until the process is over, but would bring back the default action, death, for a handler of its own.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if logger is not None:
+            wait_for_receivers([logger.publisher], _LAST_WORDS_S)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
