@@ -60,15 +60,17 @@ PACKAGES = {
             "src/ros": ("fcsl_publish_queue.h", "fcsl_sample_input.h", "fcsl_topics.h"),
             "src/history": ("fcsl_histogram.h", "fcsl_history.h", "fcsl_tick_stats.h"),
             "src/run": ("fcsl_fp_mode.h", "fcsl_library.h"),
+            "src/parameters": (),
             "src/record": ("fcsl_bag.h", "fcsl_write_queue.h", "fcsl_mcap_records.h"),
             "src/messages": ("fcsl_cdr.h",),
             "src/machine": (),
-            "src/base": ("fcsl_run.h",),
+            "src/base": ("fcsl_parameters.h", "fcsl_run.h"),
         },
         searched=("src", ".", "fc"),
     ),
     "fcsl_hal": Package(
         {
+            "firmware": (),
             "src/hal": ("fcsl_external.h", "fcsl_hal.h", "fcsl_hw_sim.h"),
             "src/named_values": ("fcsl_tick_publisher.h",),
             "src/transport": ("fcsl_wire.h",),
@@ -95,7 +97,8 @@ PACKAGES = {
                 "fcsl_socket.h",
                 "fcsl_tick_time.h",
             ),
-        }
+        },
+        searched=("src", "firmware"),
     ),
     "fcsl_compiler": Package(
         {
@@ -105,7 +108,7 @@ PACKAGES = {
                 "fcsl_ros_conversion.h",
             )
         },
-        unchecked=("test", "math", "build"),
+        unchecked=("test", "math", "build", "bare_metal"),
     ),
 }
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')

@@ -156,7 +156,8 @@ class Descriptor(c.Structure):
         ("fault_place_count", c.c_uint32),
         ("views", c.c_char_p),
         ("stack_bytes", c.c_uint32),
-        ("init", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
+        ("init", c.CFUNCTYPE(None, c.c_void_p)),
+        ("start", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
         ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
         ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),
     ]
@@ -216,8 +217,13 @@ class Machine:
         self.instances = {self.d.instances[i].name.decode(): self.d.instances[i] for i in range(self.d.instance_count)}
         self.states = [self.d.states[i].name.decode() for i in range(self.d.state_count)]
         self.channels = {self.d.channels[i].name.decode(): self.d.channels[i] for i in range(self.d.channel_count)}
-        self.init_result = self.d.init(self.base) if init else None
-        self._host = Host()
+        self.init_result = self.initialise() if init else None
+        self._events = Events()
+        self._host = Host(events=c.pointer(self._events))
+
+    def initialise(self) -> int:
+        self.d.init(self.base)
+        return int(self.d.start(self.base))
 
     @classmethod
     def build(cls, config: Path, *, init: bool = True) -> Machine:

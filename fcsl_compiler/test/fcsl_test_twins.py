@@ -49,7 +49,8 @@ class InReference(Machine):
         return cls(built.library, checked, init=init, externs=externs)
 
     def run_init(self) -> int:
-        return self.reference.init(self.memory)
+        self.reference.init(self.memory)
+        return self.reference.start(self.memory)
 
     def use_clock(self, now_ns: Callable[[], int]) -> None:
         self._python_host.clock_ns = now_ns
@@ -73,7 +74,7 @@ class Twins:
         self.init()
 
     def init(self) -> None:
-        assert self.native.d.init(self.native.base) == 0 and self.python.run_init() == 0
+        assert self.native.initialise() == 0 and self.python.run_init() == 0
         self.check("after init")
 
     def step(self, ticks: int = 1, where: str = "") -> None:

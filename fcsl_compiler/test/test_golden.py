@@ -148,7 +148,9 @@ int main(void)
     SAME("law.outputs.torque", i_law.outputs.torque);
     SAME("int.state.sum", i_int.state.sum);
     SAME("machine.tick", tick);
-    if (small_machine.size != sizeof m || small_machine.init(&m) != 0) { return 2; }
+    if (small_machine.size != sizeof m) { return 2; }
+    small_machine.init(&m);
+    if (small_machine.start(&m) != 0) { return 2; }
     small_machine.step(&m, &host);
     small_law_t one;
     small_law_init(&one);

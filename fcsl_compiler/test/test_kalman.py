@@ -98,7 +98,7 @@ def named(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 def filter_(named: tuple[Case, Twins]) -> tuple[Case, Machine]:
     """The compiled filter alone, at its start."""
     case, twins = named
-    assert twins.native.d.init(twins.native.base) == 0
+    assert twins.native.initialise() == 0
     return case, twins.native
 
 

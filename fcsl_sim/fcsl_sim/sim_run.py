@@ -21,6 +21,7 @@ from fcsl_compiler.api.types import count_of, scalar_of, shape_of
 from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.fork_safety import for_children, not_for_children
+from simclient.parameters import CParameters
 from simclient.run import Run
 
 from .config import SimConfig
@@ -83,7 +84,7 @@ class SimRun(Run):
         self.machine = self._combined()
         self._fields = tuple(self.machine.fields.values())
 
-    def _open(self, library: Path, machine: str | None) -> int | None:
+    def _open(self, library: Path, machine: str | None, parameters: CParameters | None) -> int | None:
         return self._simulation.hosted()
 
     def _place(self, name: str, address: int, size: int, run: int | None) -> None:

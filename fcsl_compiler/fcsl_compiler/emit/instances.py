@@ -145,7 +145,7 @@ class InstanceEmitter:
         name = init_name(self.m, self.i, self.first)
         body = self._initial() if name == f"{self.name}_init" else [code.Do(Call(name, (_SELF,)))]
         comment = (
-            "Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init."
+            "Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's start."
         )
         parameters = ((_SELF.text, self.pointer),)
         return Function(f"{self.name}_init", parameters, None, tuple(body), comment, exported=True, in_header=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes `init`, `step` and `force_state` of the descriptor. In a step the latched state becomes active, channels age, and
+"""Makes `init`, `start`, `step` and `force_state` of the descriptor. In a step the latched state becomes active, channels age, and
 the tick of the state runs."""
 
 from __future__ import annotations
@@ -37,13 +37,14 @@ _GREATEST_AGE = Literal(0xFFFF_FFFF, U32)
 class StepEmitter:
     """Makes the functions of the descriptor, callees first."""
 
-    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
-        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py."""
-        self.m, self.quiet, self.firsts = machine, quiet, firsts
+    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int], times: bool):
+        """See TickEmitter."""
+        self.m, self.quiet, self.firsts, self.times = machine, quiet, firsts, times
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
+        yield self._start()
         if len(self.m.states) > 1:
             yield self._enter()
         yield from TickEmitter(self.m, self.quiet, self.firsts).emit()
@@ -74,13 +75,16 @@ class StepEmitter:
                 body += store(m, port_place(m, connection.target), connection.target.type, connection.initial)
         for channel in sensors(m):
             body += [Set(channel_place(channel, member), Literal(1, code.U8)) for member in ("valid", "waiting")]
-        for index, instance in enumerate(m.instances):
-            body += self._start(index, instance)
-        body.append(code.Return(Literal(0, I32)))
         # Cold, so that C compilers do not spend time on a copy of init for every instance.
-        return replace(self._of_descriptor("init", (), body, I32), inline="rare")
+        return replace(self._of_descriptor("init", (), body), inline="rare")
 
-    def _start(self, index: int, instance: Instance) -> Iterator[Statement]:
+    def _start(self) -> Function:
+        body = [statement for n, instance in enumerate(self.m.instances) for statement in self._started(n, instance)]
+        if not body:
+            body.append(code.Unused("m"))
+        return replace(self._of_descriptor("start", (), [*body, code.Return(Literal(0, I32))], I32), inline="rare")
+
+    def _started(self, index: int, instance: Instance) -> Iterator[Statement]:
         if instance.start is None:
             return
         fault = Name("fault")

@@ -62,7 +62,8 @@ class Flight:
 
     def begin(self) -> None:
         """Puts it back to the beginning. Raises StartFaulted."""
-        status = self.reference.init(self.memory)
+        self.reference.init(self.memory)
+        status = self.reference.start(self.memory)
         if status:
             raise StartFaulted(self.m.instances[status - 1].name)
         for channel in sensors(self.m):

@@ -3,7 +3,8 @@
 
     reference = ReferenceMachine(machine, layout, places)   # a checked, scheduled fcsl_compiler.model.machine.Machine
     memory = bytearray(size)                                # as large as the layout needs
-    assert reference.init(memory) == 0
+    reference.init(memory)
+    assert reference.start(memory) == 0
     reference.step(memory)
 
 `layout` maps paths of the field table to offsets (memory.Layout); with that of a compiled machine the memory is the same, byte
@@ -246,7 +247,7 @@ class _State:
 
 
 class ReferenceMachine:
-    """`init`, `step` and `force_state` have the meaning of those in fcsl_machine.h. Not thread-safe.
+    """`init`, `start`, `step` and `force_state` have the meaning of those in fcsl_machine.h. Not thread-safe.
 
     `externs` makes the callable for a declared extern. Exceptions of user code other than faults propagate from `step`.
     """
@@ -434,9 +435,8 @@ class ReferenceMachine:
             self._image = Image(memory)
         return self._image
 
-    def init(self, memory: Memory) -> int:
-        """Zeroes the memory, binds values, runs every start in JSON order. Returns 0, or 1 + the index of the instance
-        that faulted."""
+    def init(self, memory: Memory) -> None:
+        """Zeroes the memory, binds values."""
         image = self._image_of(memory)
         image.bytes[:] = bytes(len(image.bytes))
         image.words[self._current] = _NONE
@@ -474,6 +474,10 @@ class ReferenceMachine:
             words[self._current] = _NONE
         self._apply_effects(words)
         self._arbitrate(image, state, due)
+
+    def start(self, memory: Memory) -> int:
+        """Runs every start in JSON order. Returns 0, or 1 + the index of the instance that faulted."""
+        image = self._image_of(memory)
         if self._ticks_in_state is not None:
             image.longs[self._ticks_in_state] = image.longs[self._ticks_in_state] + 1 & _LONG
         image.longs[self._tick] = tick + 1 & _LONG

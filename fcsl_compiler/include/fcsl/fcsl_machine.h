@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below, in fcsl_ros_conversion.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 11u
+#define FCSL_ABI_VERSION 12u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX
@@ -268,9 +268,11 @@ typedef struct {
     /* About how much stack a step needs: the arrays along its deepest calls; 0: unknown. Hosts refuse a machine that does not fit. */
     uint32_t stack_bytes;
 
-    /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
-     * Returns 0, or 1 + the index of the instance whose start() faulted; see its fault place. */
-    int32_t (*init)(void *machine);
+    /* Zeroes the struct, binds parameters and initial values. A host may write other parameters before `start`. */
+    void (*init)(void *machine);
+    /* Runs every start() in JSON order, once after each init. Returns 0, or 1 + the index of the instance whose start() faulted;
+     * see its fault place. */
+    int32_t (*start)(void *machine);
     /* Runs one tick. */
     void (*step)(void *machine, const fcsl_host_t *host);
     /* Enters `state` (an index into states) immediately and cancels a latched transition. Instances scheduled in both the old

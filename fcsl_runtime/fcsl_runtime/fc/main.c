@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -104,15 +105,33 @@ static int make_hal(program_t *program)
     return hal_composite(&program->board, &named, loop->run, &loop->hal, &error) == 0 ? 0 : complain(error.text);
 }
 
+/* The machine with its parameters; null with `error`. */
+static fcsl_run_t *open_machine(const options_t *options, fcsl_error_t *error)
+{
+    if (options->parameters == NULL) {
+        return fcsl_run_open(options->library, options->machine, NULL, error);
+    }
+    size_t size = 0;
+    char *text = fcsl_parameters_read(options->parameters, &size, error);
+    if (text == NULL) {
+        return NULL;
+    }
+    const fcsl_parameters_t parameters = {
+        .text = text, .size = size, .name = options->parameters, .name_space = options->name_space};
+    fcsl_run_t *run = fcsl_run_open(options->library, options->machine, &parameters, error);
+    free(text);
+    return run;
+}
+
 static int open_run(program_t *program)
 {
     fcsl_error_t error;
+    const options_t *options = &program->options;
     loop_t *loop = &program->loop;
-    loop->run = fcsl_run_open(program->options.library, program->options.machine, &error);
+    loop->run = open_machine(options, &error);
     if (loop->run == NULL) {
         return complain(error.text);
     }
-    const options_t *options = &program->options;
     if (options->restore != NULL &&
         fcsl_run_restore_file(loop->run, options->restore, options->ignore_source_hash, &error) != 0) {
         return complain(error.text);
@@ -317,6 +336,9 @@ static void announce(const program_t *program)
     if (program->options.board != NULL) {
         log_info("board %s", program->options.board);
     }
+    if (program->options.parameters != NULL) {
+        log_info("parameters of %s", program->options.parameters);
+    }
     if (program->options.guard != NULL) {
         log_info("actuators by the guard at %s", program->options.guard);
     }
@@ -422,7 +444,7 @@ static int has_named_files(const options_t *options)
     const char *plan = options_hal_is_linux(options)       ? options->peer + strlen(OPTIONS_LINUX)
                        : options_hal_is_composite(options) ? options->composite_plan
                                                            : NULL;
-    const char *const named[] = {options->library, options->restore, options->board, plan};
+    const char *const named[] = {options->library, options->parameters, options->restore, options->board, plan};
     for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) {
         if (named[i] != NULL && access(named[i], F_OK) != 0) {
             return 0;

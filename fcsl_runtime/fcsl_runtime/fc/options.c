@@ -38,6 +38,8 @@ static const char USAGE[] =
     "  --timeout SECONDS       how long to wait for the simulator's next message (default 2)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/hardware/arming.md)\n"
+    "  --parameters FILE       begin with the values of a parameter file (docs/reference/variables.md) instead of the "
+    "compiled ones\n"
     "  --ticks N               end after N ticks\n"
     "  --restore FILE          begin where the checkpoint in FILE was saved (docs/guide/recording.md), not at tick 0\n"
     "  --ignore-source-hash    take a checkpoint of other sources, if the layout of the machine is the same\n"
@@ -197,6 +199,7 @@ static const entry_t ENTRIES[] = {
     {.name = "timeout", .kind = SECONDS, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
     {.name = "board", .kind = TEXT, .offset = TO(board)},
     {.name = "guard", .kind = TEXT, .offset = TO(guard)},
+    {.name = "parameters", .kind = TEXT, .offset = TO(parameters)},
     {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
     {.name = "restore", .kind = TEXT, .offset = TO(restore)},
     {.name = "ignore-source-hash", .kind = FLAG, .offset = TO(ignore_source_hash)},
@@ -283,15 +286,19 @@ static int check(const options_t *options)
         return usage_error("--timeout does not go with ,free-running: nobody waits for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
-        options->ros == NULL &&
+        options->ros == NULL && options->parameters == NULL &&
         (options->peer == NULL || options_hal_is_linux(options) ||
          strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
-        return usage_error(
-            "--namespace needs --record, --observers, --ros or --hal zenoh:…: it is of topics, and of keys of the bus",
-            "");
+        return usage_error("--namespace needs --record, --observers, --ros, --parameters or --hal zenoh:…: it is of "
+                           "topics, of keys of the bus, "
+                           "and of sections of a parameter file",
+                           "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");
+    }
+    if (options->restore != NULL && options->parameters != NULL) {
+        return usage_error("--parameters does not go with --restore: the checkpoint has the parameters of its run", "");
     }
     if (options->restore != NULL && has_simulator(options)) {
         return usage_error("--restore goes without a simulator: that begins at tick 0", "");

@@ -22,6 +22,7 @@ typedef struct {
         composite_plan[OPTIONS_PATH_BYTES]; /* of the board whose sensors take the place of the simulator's; "": none */
     const char *board; /* null: simulated hardware */
     const char *guard; /* socket of fcsl-guard; null: none */
+    const char *parameters; /* parameter file; null: the compiled values */
     const char *restore; /* file of a checkpoint to begin from; null: from tick 0 */
     const char *socket; /* null: no variable server */
     const char *token; /* file with its token, for TCP */

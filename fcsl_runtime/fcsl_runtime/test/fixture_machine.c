@@ -39,10 +39,15 @@ static void copy_health(data_t *m)
     m->far[1].health = m->compiled.i_pilot.outputs.health;
 }
 
-static int32_t init(void *machine)
+static void init(void *machine)
 {
     memset(machine, 0, sizeof(data_t));
-    const int32_t failed = fixture_machine.init(machine);
+    fixture_machine.init(machine);
+}
+
+static int32_t start(void *machine)
+{
+    const int32_t failed = fixture_machine.start(machine);
     copy_health(machine);
     return failed;
 }
@@ -104,6 +109,7 @@ __attribute__((constructor)) static void derive(void)
     }
     fixture.size = sizeof(data_t);
     fixture.init = init;
+    fixture.start = start;
     fixture.step = step;
     fixture.force_state = force_state;
     fixture.views = "{\"panels\":[]}"; /* any text: no host interprets it */

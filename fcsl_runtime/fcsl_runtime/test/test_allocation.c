@@ -42,7 +42,7 @@ static void fly_tick(fcsl_run_t *run, uint64_t tick)
 static uint64_t count_allocations(const char *library, const char *bag, int lossless)
 {
     fcsl_error_t error = {""};
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     CHECK(run != NULL && fcsl_run_attach(run, &error) == 0);
     fcsl_run_set_clock(run, fcsl_run_monotonic_ns, NULL);
     if (bag != NULL) {

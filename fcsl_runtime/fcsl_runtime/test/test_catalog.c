@@ -3,6 +3,7 @@
  * Arrays of structs in a table of fields: slices of those that are regular, and none of those that are not. The sources are
  * compiled in.
  */
+#include "base/nearest.c"
 #include "vars/catalog.c"
 
 #include "vars/catalog_slice.c"

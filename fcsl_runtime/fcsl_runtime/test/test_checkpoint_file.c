@@ -14,7 +14,7 @@
 static fcsl_run_t *open_fixture(const char *library)
 {
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     CHECK(run != NULL);
     return run;
 }

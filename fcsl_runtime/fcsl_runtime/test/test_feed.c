@@ -13,7 +13,7 @@ enum { GYRO = 0, ARMED = 1, TICKS = 40, RECORDS = 8 };
 static fcsl_run_t *open_attached(const char *library)
 {
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     CHECK(run != NULL);
     CHECK(fcsl_run_attach(run, &error) == 0);
     return run;

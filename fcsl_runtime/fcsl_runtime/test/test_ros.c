@@ -232,7 +232,7 @@ static void test_sample_input(const char *library)
                                                .size = 24};
     static const uint32_t channels[] = {0, 1};
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", NULL, &error);
     fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&conversion, &error);
     CHECK(run != NULL && reader != NULL);
     CHECK(fcsl_sample_input_new(run, reader, channels, 2, &error) == NULL);

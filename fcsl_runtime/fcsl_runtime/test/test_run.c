@@ -18,7 +18,7 @@ static const char *library;
 static fcsl_run_t *open_fixture(void)
 {
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     if (run == NULL) {
         (void)fprintf(stderr, "%s\n", error.text);
         exit(1);
@@ -118,11 +118,11 @@ static void check_refused(int status, const fcsl_error_t *error, const char *par
 static void test_open(void)
 {
     fcsl_error_t error;
-    CHECK(fcsl_run_open("/nonexistent/libx.so", NULL, &error) == NULL &&
+    CHECK(fcsl_run_open("/nonexistent/libx.so", NULL, NULL, &error) == NULL &&
           strstr(error.text, "/nonexistent/libx.so") != NULL);
-    CHECK(fcsl_run_open(library, "other", &error) == NULL && strstr(error.text, "it holds: fixture") != NULL);
-    CHECK(fcsl_run_open("libc.so.6", NULL, &error) == NULL);
-    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    CHECK(fcsl_run_open(library, "other", NULL, &error) == NULL && strstr(error.text, "it holds: fixture") != NULL);
+    CHECK(fcsl_run_open("libc.so.6", NULL, NULL, &error) == NULL);
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", NULL, &error);
     CHECK(run != NULL && fcsl_run_tick(run) == 0);
     close_run(run);
     CHECK(fcsl_run_close(NULL, &error) == 0);
@@ -149,7 +149,7 @@ static void test_armed(void)
     channels[SATURATED].safe = &SAFE_SATURATED;
     own.channels = channels;
     own.arm_field = (int32_t)field_of(first, "sensors.outputs.armed");
-    fcsl_run_t *run = fcsl_run_open_machine(&own, &error);
+    fcsl_run_t *run = fcsl_run_open_machine(&own, NULL, &error);
     CHECK(run != NULL);
     const uint32_t force = own.fields[channels[FORCE].field].offset;
     const uint32_t saturated = own.fields[channels[SATURATED].field].offset;
@@ -176,10 +176,10 @@ static void test_armed(void)
 static void test_open_machine(void)
 {
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", NULL, &error);
     CHECK(run != NULL);
     fcsl_machine_t own = *fcsl_run_machine(run);
-    fcsl_run_t *second = fcsl_run_open_machine(&own, &error);
+    fcsl_run_t *second = fcsl_run_open_machine(&own, NULL, &error);
     CHECK(second != NULL && fcsl_run_machine(second) == &own);
     step(second, 3);
     own.step = give_up;
@@ -187,7 +187,7 @@ static void test_open_machine(void)
     CHECK(fcsl_run_tick(second) == 3);
     close_run(second);
     own.step = NULL;
-    CHECK(fcsl_run_open_machine(&own, &error) == NULL);
+    CHECK(fcsl_run_open_machine(&own, NULL, &error) == NULL);
     close_run(run);
 }
 
@@ -367,7 +367,7 @@ static void test_no_injection(void)
     memcpy(instances, own.instances, sizeof instances);
     instances[1].inject_fault_offset = FCSL_NO_OFFSET;
     own.instances = instances;
-    fcsl_run_t *run = fcsl_run_open_machine(&own, &error);
+    fcsl_run_t *run = fcsl_run_open_machine(&own, NULL, &error);
     CHECK(run != NULL && fcsl_run_inject_fault(run, 0, &error) == 0);
     check_refused(fcsl_run_inject_fault(run, 1, &error), &error, "built without injected faults");
     close_run(run);

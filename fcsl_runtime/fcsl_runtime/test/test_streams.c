@@ -12,6 +12,7 @@
 #include "vars/subscription.c"
 #include "vars/value.c"
 #include "machine/enumerators.c"
+#include "machine/scalar_text.c"
 #include "machine/view.c"
 
 #include "fcsl_check.h"

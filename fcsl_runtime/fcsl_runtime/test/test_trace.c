@@ -14,7 +14,7 @@ enum { CAPACITY = 7, TICKS = 40 };
 static fcsl_run_t *open_run(const char *library)
 {
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     CHECK(run != NULL);
     return run;
 }

@@ -26,7 +26,7 @@ int main(int argc, char **argv)
     static loop_t loop;
     char text[256];
     CHECK(argc == 2);
-    loop.run = fcsl_run_open(argv[1], NULL, &error);
+    loop.run = fcsl_run_open(argv[1], NULL, NULL, &error);
     CHECK(loop.run != NULL);
     fcsl_tick_stats_put(&loop.stats.tick, 7);
     watchdog_describe(&loop, 5000000, text, sizeof text);

@@ -138,7 +138,7 @@ static void check_threads(fcsl_run_t *run, fcsl_write_queue_t *queue)
 int main(int argc, char **argv)
 {
     CHECK(argc == 2);
-    fcsl_run_t *run = fcsl_run_open(argv[1], NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(argv[1], NULL, NULL, &error);
     CHECK(run != NULL && fcsl_run_next_write(run) == 0);
     fcsl_write_queue_t *queue = fcsl_run_write_queue(run, &error);
     CHECK(queue != NULL && fcsl_run_write_queue(run, &error) == queue);

@@ -53,7 +53,7 @@ int main(int argc, char **argv)
     fcsl_error_t error;
     fcsl_external_t *external = NULL;
     CHECK(argc == 5);
-    fcsl_run_t *run = fcsl_run_open(argv[1], NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(argv[1], NULL, NULL, &error);
     CHECK(run != NULL && fcsl_run_attach(run, &error) == 0);
     uint8_t *data = calloc(1, fcsl_run_machine(run)->size);
     CHECK(data != NULL);

@@ -195,6 +195,7 @@ class CMonitor(Structure):
         ("watched", c_char_p),
         ("machine", POINTER(CMachine)),
         ("observed", POINTER(CObserved)),
+        ("start", c_void_p),
         ("observed_count", c_uint32),
         ("requirements", POINTER(CRequirement)),
         ("requirement_count", c_uint32),

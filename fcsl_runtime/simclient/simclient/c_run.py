@@ -10,6 +10,7 @@ from pathlib import Path
 from .c_machine import CMachine, CMonitor, CRequirement
 from .hardware import CSimulatedHardware
 from .library import bind_runtime
+from .parameters import CParameters
 
 
 class CError(Structure):
@@ -82,8 +83,8 @@ VERDICTS: dict[str, tuple[type | None, list[type]]] = {
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
-    "fcsl_run_open": (ptr, [c_char_p, c_char_p, _ERROR]),
-    "fcsl_run_open_machine": (ptr, [POINTER(CMachine), _ERROR]),
+    "fcsl_run_open": (ptr, [c_char_p, c_char_p, POINTER(CParameters), _ERROR]),
+    "fcsl_run_open_machine": (ptr, [POINTER(CMachine), POINTER(CParameters), _ERROR]),
     "fcsl_run_close": (c_int, [ptr, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),

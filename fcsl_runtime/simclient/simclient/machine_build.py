@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .errors import TwinError
+from .parameters import Given, Parameters, read_parameters
 
 
 def find_config(path: str | Path, caller: str = "", what: str = "machine config") -> Path:
@@ -26,6 +27,13 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
         if candidate.is_dir():
             raise TwinError(f"{candidate.absolute()}: a directory; name the {what.split()[0]}'s JSON file")
     raise TwinError(f"no such {what}: {' nor '.join(str(p.absolute()) for p in tried)}")
+
+
+def find_parameters(given: Given | None, caller: str) -> Parameters | None:
+    """Parameters that a caller gives; a path is found as that of a config is. Raises TwinError."""
+    if isinstance(given, str | Path) and not Path(given).exists():
+        given = find_config(given, caller, "parameter file")
+    return read_parameters(given)
 
 
 def check_backend(backend: str) -> None:

@@ -18,6 +18,7 @@ from .errors import TwinError
 from .fork_safety import FORKED, for_children, not_for_children
 from .hardware import COUNT, CSimulatedHardware
 from .library import runtime_library
+from .parameters import CParameters, Parameters
 
 if TYPE_CHECKING:
     from .requirements import Verdict
@@ -39,13 +40,13 @@ _MAX_MESSAGE_BYTES = 1 << 20
 class Run:
     """Owns one fcsl_run_t. Not thread-safe; every failure is a TwinError with the runtime's message."""
 
-    def __init__(self, library: Path, machine: str | None):
+    def __init__(self, library: Path, machine: str | None, parameters: Parameters | None = None):
         self._handle: int | None = None
         self._without = "the twin is closed"
         self._checkpoint: ctypes.Array[c_char] | None = None
         self._lib = load_runtime(runtime_library())
         self._error = CError()
-        self._handle = self._open(library, machine)
+        self._handle = self._open(library, machine, None if parameters is None else parameters.to_c())
         if not self._handle:
             raise self._failure()
         self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
@@ -61,10 +62,10 @@ class Run:
         self._once.restype = c_int64
         self._once_arguments = (ptr(self._handle), byref(self._error))
 
-    def _open(self, library: Path, machine: str | None) -> int | None:
+    def _open(self, library: Path, machine: str | None, parameters: CParameters | None) -> int | None:
         """The address of the fcsl_run_t, or None with the error filled in."""
         name = None if machine is None else machine.encode()
-        handle: int | None = self._lib.fcsl_run_open(str(library).encode(), name, byref(self._error))
+        handle: int | None = self._lib.fcsl_run_open(str(library).encode(), name, parameters, byref(self._error))
         return handle
 
     def _failure(self) -> BaseException:
@@ -452,8 +453,8 @@ class RunTrace:
         self._trace = 0
 
 
-def open_run(library: Path, machine: str | None) -> Run:
-    """Loads `machine` (None: the only one) of the machine library.
+def open_run(library: Path, machine: str | None, parameters: Parameters | None = None) -> Run:
+    """Loads `machine` (None: the only one) of the machine library, to begin with `parameters` instead of the compiled values.
 
     Raises TwinError, also if it is older than its sources.
     """
@@ -461,7 +462,7 @@ def open_run(library: Path, machine: str | None) -> Run:
 
     if not library.is_file():
         raise TwinError(f"{library}: no such machine library")
-    run = Run(library, machine)
+    run = Run(library, machine, parameters)
     try:
         check_record(library, run.machine.name, run.machine.build_hash)
     except StaleBuild as error:

@@ -14,7 +14,7 @@
 int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan, fcsl_error_t *error)
 {
     companion->name = plan->name;
-    companion->run = fcsl_run_open(plan->library, plan->machine, error);
+    companion->run = fcsl_run_open(plan->library, plan->machine, NULL, error);
     if (!companion->run) {
         return -1;
     }

@@ -51,7 +51,7 @@ fcsl_machine_model_t *fcsl_machine_model_open(const char *library, const char *m
         (void)fcsl_fail(error, "no memory for the model `%s`", machine);
         return NULL;
     }
-    model->run = fcsl_run_open(library, machine, error);
+    model->run = fcsl_run_open(library, machine, NULL, error);
     model->machine = model->run ? fcsl_run_machine(model->run) : NULL;
     model->fields = model->run ? calloc(model->machine->field_count + 1u, sizeof *model->fields) : NULL;
     if (!model->fields || model->machine->instance_count != 1u) {
@@ -101,7 +101,8 @@ const fcsl_model_t *fcsl_machine_model_of(const fcsl_machine_model_t *model)
 
 int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error)
 {
-    return model->machine->init(self) == 0 ? 0 : fcsl_fail(error, "`start` of `%s` faults", model->machine->name);
+    model->machine->init(self);
+    return model->machine->start(self) == 0 ? 0 : fcsl_fail(error, "`start` of `%s` faults", model->machine->name);
 }
 
 int fcsl_machine_model_takes(const fcsl_machine_model_t *model, const void *self)

@@ -27,7 +27,7 @@
 static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
-    sim->run = fcsl_run_open(plan->machine.library, plan->machine.name, error);
+    sim->run = fcsl_run_open(plan->machine.library, plan->machine.name, NULL, error);
     if (!sim->run) {
         return -1;
     }

@@ -47,8 +47,13 @@ const fcsl_machine_t *load_machine(const char *library)
 void *new_machine(const fcsl_machine_t *machine)
 {
     void *data = aligned_alloc(64, (machine->size + 63u) / 64u * 64u);
-    if (data == NULL || machine->init(data) != 0) {
-        fprintf(stderr, "bench: init of %s failed\n", machine->name);
+    if (data == NULL) {
+        fprintf(stderr, "bench: out of memory\n");
+        exit(1);
+    }
+    machine->init(data);
+    if (machine->start(data) != 0) {
+        fprintf(stderr, "bench: start of %s failed\n", machine->name);
         exit(1);
     }
     return data;

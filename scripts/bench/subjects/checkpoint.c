@@ -61,7 +61,7 @@ int main(int argc, char **argv)
     }
     const int rounds = atoi(argv[2]);
     fcsl_error_t error = {""};
-    subject_t s = {.run = fcsl_run_open(argv[1], NULL, &error)};
+    subject_t s = {.run = fcsl_run_open(argv[1], NULL, NULL, &error)};
     need(s.run != NULL ? 0 : -1, &error);
     need(fcsl_run_step(s.run, 100, &error), &error);
     s.size = fcsl_run_machine(s.run)->size;

@@ -25,7 +25,7 @@ enum { BURST_TICKS = 4000, PAUSE_NS = 150000000, PACED_TICKS = 2000, PERIOD_NS =
 static fcsl_run_t *open_run(const char *library)
 {
     fcsl_error_t error = {""};
-    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    fcsl_run_t *run = fcsl_run_open(library, NULL, NULL, &error);
     if (run == NULL) {
         fprintf(stderr, "record: %s\n", error.text);
         exit(1);

@@ -51,7 +51,7 @@ int main(int argc, char **argv)
 {
     fcsl_history_t history;
     fcsl_telemetry_counters_t counters = {0};
-    fcsl_run_t *run = argc == 5 ? fcsl_run_open(argv[1], NULL, &error) : NULL;
+    fcsl_run_t *run = argc == 5 ? fcsl_run_open(argv[1], NULL, NULL, &error) : NULL;
     need(run != NULL);
     const fcsl_machine_t *machine = fcsl_run_machine(run);
     const fcsl_part_t part = {.data = fcsl_run_data(run), .size = machine->size};

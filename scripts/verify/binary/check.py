@@ -87,8 +87,8 @@ def check(binary: Binary, tools: Tools) -> Result:
 def _judge(binary: Binary, seen: dict[str, int], result: Result) -> None:
     """What the run showed, against what it may."""
     found = result.findings
-    if seen["init"]:
-        found["init"] = f"start() of instance {seen['init'] - 1} faulted; nothing ran"
+    if seen["start"]:
+        found["start"] = f"start() of instance {seen['start'] - 1} faulted; nothing ran"
     if seen["visited"] != seen["states"]:
         found["states"] = f"{seen['visited']} of {seen['states']} states were visited"
     if seen["allocations"]:
@@ -98,11 +98,12 @@ def _judge(binary: Binary, seen: dict[str, int], result: Result) -> None:
     if not seen["signals"]:
         found["signals"] = "the signal mask is not as it was"
     code = result.figures.get("code")
-    bounds = {"step": [binary.bound, code and code.bounds["step"]], "init": [code and code.bounds["init"]]}
+    bounds = {entry: [code and code.bounds[entry]] for entry in ("init", "start", "step")}
+    bounds["step"].append(binary.bound)
     for entry, numbers in bounds.items():
         measured = seen[f"{entry}_bytes"]
         if any(bound is not None and measured > bound for bound in numbers):
-            found["stack"] = f"{entry} used {measured} bytes of stack, more than {numbers} (graphs, code)"
+            found["stack"] = f"{entry} used {measured} bytes of stack, more than {numbers} (code, graphs)"
     if binary.bound and code and not binary.externs and code.bounds["step"] > binary.bound:
         found["stack"] = (
             f"the code needs {code.bounds['step']} bytes of stack, more than the {binary.bound} that are told"

@@ -26,12 +26,12 @@ _HOST_CALL = re.compile(
 _INDIRECT = "__indirect_call"
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n\d+ bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)" label: "([^"]+)"')
-_ENTRIES = ("init", "step", "force_state")
+_ENTRIES = ("init", "start", "step", "force_state")
 
 
 @dataclass(frozen=True)
 class Calls:
-    """`host` has one name for each place that calls the host's table. `bounds`: bytes for init, step, force_state.
+    """`host` has one name for each place that calls the host's table. `bounds`: bytes for init, start, step, force_state.
 
     `chain`: functions in the longest chain of calls.
     """

@@ -4,7 +4,7 @@
  * Usage: binary_run LIBRARY MACHINE TICKS SEED free|strict
  *   free    compares the floating-point environment and the signal mask before and after, too
  *   strict  in the kernel's strict seccomp mode: a system call other than read, write and exit kills the process
- * Prints `name value` lines: init (what it returned; unless 0, no tick runs), ticks, states and visited (states), init_bytes and
+ * Prints `name value` lines: start (what it returned; unless 0, no tick runs), ticks, states and visited (states), init_bytes, start_bytes and
  * step_bytes (of stack), allocations (calls), environment and signals (1: as before). Exits with 77 where the kernel does not offer the strict mode.
  */
 #define _GNU_SOURCE
@@ -119,17 +119,21 @@ static void watch(const fcsl_machine_t *d, void *machine, uint64_t ticks, uint64
     const environment_t before = environment();
     painted_begin();
     counted_armed = true;
-    const uint64_t failed = on_painted_stack((const void *)d->init, machine, NULL);
+    (void)on_painted_stack((const void *)d->init, machine, NULL);
     const size_t init_bytes = painted_used();
+    painted_begin();
+    const uint64_t failed = on_painted_stack((const void *)d->start, machine, NULL);
+    const size_t start_bytes = painted_used();
     painted_begin();
     const uint32_t visited = (uint32_t)failed == 0u ? fly(d, machine, ticks, seed) : 0u;
     counted_armed = false;
     const environment_t after = environment();
-    print("init", (uint32_t)failed);
+    print("start", (uint32_t)failed);
     print("ticks", (uint32_t)failed == 0u ? ticks : 0u);
     print("states", d->state_count);
     print("visited", visited);
     print("init_bytes", init_bytes);
+    print("start_bytes", start_bytes);
     print("step_bytes", painted_used());
     print("allocations", counted_calls);
     print("environment", memcmp(&before, &after, sizeof before) == 0);

@@ -66,7 +66,11 @@ static int run(const fcsl_machine_t *d, int argc, char **argv)
     const int is_trace = argv[1][0] == 't';
     int mark = 5;
     uint64_t hash = 0;
-    if (d->size > sizeof machine || d->init(machine) != 0) {
+    if (d->size > sizeof machine) {
+        return -1;
+    }
+    d->init(machine);
+    if (d->start(machine) != 0) {
         return -1;
     }
     stimulus_host_begin(&host, seed);

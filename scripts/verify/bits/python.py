@@ -18,7 +18,8 @@ from simclient.twin.python_run import PythonMachine, fault_rows_of, find_descrip
 
 from ..shared import stimulus
 
-_Init = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
+_Init = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+_Start = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
 _Step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
@@ -38,8 +39,10 @@ class StimulatedTwin:
 
     def run(self, ticks: int) -> Iterator[int]:
         """The chained hash after every tick: what `run` of bits.c does."""
-        init, step = _Init(self._descriptor.init), _Step(self._descriptor.step)
-        if init(ctypes.addressof(self._memory)) != 0:
+        entries = self._descriptor
+        init, start, step = _Init(entries.init), _Start(entries.start), _Step(entries.step)
+        init(ctypes.addressof(self._memory))
+        if start(ctypes.addressof(self._memory)) != 0:
             raise ValueError("the machine does not begin")
         hash_, host = 0, ctypes.addressof(self._host) + stimulus.CStimulusHost.host.offset
         self._stimulus.stimulus_begin(self._descriptor, self._memory)

@@ -51,7 +51,8 @@ int main(int count, char **words)
 {
     static trial_t m;
     const fcsl_host_t host = {0};
-    if (trial_machine.init(&m) != 0) {
+    trial_machine.init(&m);
+    if (trial_machine.start(&m) != 0) {
         return 1;
     }
     for (int k = 1; k < count; ++k) {

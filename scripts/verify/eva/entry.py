@@ -49,7 +49,8 @@ static int32_t substitute(void *ctx, uint32_t instance)
     fcsl_host_t host = {{0}};
     {name}_t memory;
     machine = &memory;
-    const int32_t failed = {name}_machine.init(machine);
+    {name}_machine.init(machine);
+    const int32_t failed = {name}_machine.start(machine);
     if (failed != 0) {{
         return failed;
     }}

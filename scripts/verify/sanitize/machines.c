@@ -14,7 +14,11 @@ static const uint64_t SEED = 1;
 static int run_machine(const fcsl_machine_t *d, uint64_t ticks)
 {
     void *machine = aligned_alloc(d->align, ((size_t)d->size + d->align - 1u) / d->align * d->align);
-    if (machine == NULL || d->init(machine) != 0) {
+    if (machine == NULL) {
+        return -1;
+    }
+    d->init(machine);
+    if (d->start(machine) != 0) {
         free(machine);
         return -1;
     }

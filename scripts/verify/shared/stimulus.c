@@ -269,7 +269,8 @@ void stimulus_begin(const fcsl_machine_t *d, void *machine)
 void stimulus_tick(const fcsl_machine_t *d, void *machine, uint64_t tick, uint64_t seed)
 {
     if (tick > 0 && tick % BLOCK == 0) {
-        (void)d->init(machine); /* it succeeded once, and knows no other inputs */
+        d->init(machine);
+        (void)d->start(machine); /* it succeeded once, and knows no other inputs */
         stimulus_begin(d, machine);
         put(machine, d->tick_offset, 8u, tick / BLOCK % 2u != 0u ? 0u : tick);
     }

@@ -5,6 +5,7 @@
  * integer arithmetic, and hashed by value.
  *
  *     d->init(machine);
+ *     d->start(machine);
  *     stimulus_begin(d, machine);
  *     stimulus_host_t host;
  *     stimulus_host_begin(&host, seed);

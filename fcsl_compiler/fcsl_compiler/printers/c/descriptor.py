@@ -225,7 +225,7 @@ class DescriptorEmitter:
             rows["command_timeout_ns"] = f"UINT64_C({m.command_timeout_ns})"
         if self.after_ticks != "NULL":
             rows |= {"after_ticks": self.after_ticks, "ticks_in_state_offset": self._offset("ticks_in_state")}
-        for entry in ("init", "step", "force_state"):
+        for entry in ("init", "start", "step", "force_state"):
             rows[entry] = f"fcsl_{entry}_{m.name}"
         with self.w.braces(f"const fcsl_machine_t {m.name}_machine =", "};"):
             for key, value in rows.items():

@@ -187,7 +187,8 @@ def _record(w: NimWriter, module: Module, record: code.Record) -> None:
 def _face(w: NimWriter, module: Module, program: code.Program) -> None:
     """What a Nim program hosts the machine with."""
     machine = module.types_of[f"{program.name}_t"]
-    init, step, force = (module.globals.of(f"fcsl_{entry}_{program.name}") for entry in ("init", "step", "force_state"))
+    entries = ("init", "start", "step", "force_state")
+    init, start, step, force = (module.globals.of(f"fcsl_{entry}_{program.name}") for entry in entries)
     w.block(f"""\
 proc initMachine*(m: var {machine}): int32 =
   ## Zeroes the machine, binds parameters, runs start of every instance. Returns 0, or 1 + the index of the instance whose
@@ -203,3 +204,4 @@ proc forceState*(m: var {machine}, state: {module.state_type}) =
   {force}(addr m, int32(ord(state)))
 """)
     w.line()
+  {start}(addr m)

@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_hw_sim.h"
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_monitor.h"
+#include "fcsl/fcsl_parameters.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -21,11 +22,15 @@ extern "C" {
 
 typedef struct fcsl_run fcsl_run_t;
 
-/* Loads `library` and initialises its machine named `machine` (null: the library must hold exactly one).
- * Refuses another ABI version, descriptors that do not check out, and a start() that faults. */
-fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error);
+/* Loads `library` and initialises its machine named `machine` (null: the library must hold exactly one). Values of `parameters`
+ * (null: none) take the place of the compiled ones before any start() runs, so that they are part of the run's beginning.
+ * Refuses another ABI version, descriptors that do not check out, parameters that are not the machine's, and a start() that
+ * faults. */
+fcsl_run_t *fcsl_run_open(const char *library, const char *machine, const fcsl_parameters_t *parameters,
+                          fcsl_error_t *error);
 /* The same for a descriptor that the caller has (PyTwin puts Python behind its functions); it must outlive the run. */
-fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *error);
+fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, const fcsl_parameters_t *parameters,
+                                  fcsl_error_t *error);
 /* Stops recording (see fcsl_run_record_stop) and unloads. */
 int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error);
 

@@ -123,11 +123,22 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     return fcsl_io_replay_open(run, error);
 }
 
-static int initialise(fcsl_run_t *run, fcsl_error_t *error)
+static int bind_parameter(void *ctx, uint32_t field, const void *bytes, fcsl_error_t *error)
+{
+    (void)error;
+    fcsl_run_t *run = ctx;
+    memcpy(run->data + run->machine->fields[field].offset, bytes, run->machine->fields[field].size);
+    return 0;
+}
+
+static int initialise(fcsl_run_t *run, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
     const fcsl_fp_mode_t callers = fcsl_fp_enter();
-    const int32_t faulted = machine->init(run->data);
+    machine->init(run->data);
+    const int refused =
+        parameters != NULL && fcsl_parameters_each(machine, parameters, bind_parameter, run, error) != 0;
+    const int32_t faulted = refused ? 0 : machine->start(run->data);
     fcsl_fp_leave(callers);
     if (faulted == 0) {
         return 0;
@@ -182,10 +193,10 @@ static int check_stack(const fcsl_machine_t *machine, fcsl_error_t *error)
 }
 
 /* Initialises the machine of a run, which was checked; frees the run when that fails (or when there is no machine). */
-static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
+static fcsl_run_t *begin(fcsl_run_t *run, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     if (run->machine == NULL || check_stack(run->machine, error) != 0 || allocate(run, error) != 0 ||
-        initialise(run, error) != 0) {
+        initialise(run, parameters, error) != 0) {
         release(run);
         return NULL;
     }
@@ -194,7 +205,8 @@ static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
     return run;
 }
 
-fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error)
+fcsl_run_t *fcsl_run_open(const char *library, const char *machine, const fcsl_parameters_t *parameters,
+                          fcsl_error_t *error)
 {
     fcsl_run_t *run = calloc(1, sizeof *run);
     if (run == NULL) {
@@ -205,7 +217,7 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
     if (run->machine != NULL && fcsl_cover_attach(run->library, library, run->machine, error) != 0) {
         run->machine = NULL;
     }
-    run = begin(run, error);
+    run = begin(run, parameters, error);
     const fcsl_monitor_t *monitor = run != NULL ? fcsl_monitor_in(run->library, run->machine->name) : NULL;
     if (monitor != NULL && fcsl_run_use_monitor(run, monitor, error) != 0) {
         release(run);
@@ -214,7 +226,8 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
     return run;
 }
 
-fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *error)
+fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, const fcsl_parameters_t *parameters,
+                                  fcsl_error_t *error)
 {
     fcsl_run_t *run = calloc(1, sizeof *run);
     if (run == NULL) {
@@ -222,7 +235,7 @@ fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *e
         return NULL;
     }
     run->machine = fcsl_validate(machine, error) == 0 ? machine : NULL;
-    return begin(run, error);
+    return begin(run, parameters, error);
 }
 
 int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error)

@@ -179,7 +179,7 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
                                 (size_t)monitor->observed_count * FCSL_VERDICT_VALUE_BYTES);
     made->fields = calloc(served, sizeof *made->fields);
     made->paths = calloc(served, PATH_BYTES);
-    made->run = fcsl_run_open_machine(monitor->machine, error);
+    made->run = fcsl_run_open_machine(monitor->machine, NULL, error);
     if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->noted == NULL ||
         made->fields == NULL || made->paths == NULL || made->kept == NULL || made->kept_fields == NULL ||
         made->kept_begin == NULL) {

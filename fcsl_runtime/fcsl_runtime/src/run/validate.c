@@ -324,7 +324,8 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
                        machine->ros_message_count <= machine->channel_count &&
                        (machine->ros_message_count == 0 || machine->ros_messages != NULL) && machine->state_count > 0 &&
                        machine->states != NULL;
-    const int code = machine->init != NULL && machine->step != NULL && machine->force_state != NULL;
+    const int code =
+        machine->init != NULL && machine->start != NULL && machine->step != NULL && machine->force_state != NULL;
     const int places =
         in_struct(machine, machine->current_offset, 4, 4) && in_struct(machine, machine->tick_offset, 8, 8) &&
         in_struct(machine, machine->state_offset, 4, 4) && in_struct(machine, machine->next_state_offset, 4, 4);

@@ -6,11 +6,10 @@
 #include "writes.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
+#include "machine/scalar_text.h"
 #include "range.h"
 #include "record/write_queue.h"
 #include "record/recorder.h"
@@ -36,19 +35,15 @@ void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write)
 static const char *range_text(const fcsl_field_t *field, char text[RANGE_BYTES])
 {
     const double bounds[2] = {field->minimum, field->maximum};
-    char shown[2][RANGE_BYTES / 2 - 4];
+    char shown[2][SCALAR_TEXT_BYTES];
     for (int i = 0; i < 2; i++) {
         if (field->type != FCSL_F32 && field->type != FCSL_F64) {
             (void)snprintf(shown[i], sizeof shown[i], "%.0f", bounds[i]);
             continue;
         }
-        double back = NAN;
-        for (int digits = 6; digits <= 17 && back != bounds[i]; digits++) {
-            (void)snprintf(shown[i], sizeof shown[i], "%.*g", digits, bounds[i]);
-            back = field->type == FCSL_F32 ? (double)strtof(shown[i], NULL) : strtod(shown[i], NULL);
-        }
+        fcsl_float_text(bounds[i], field->type, shown[i]);
     }
-    (void)snprintf(text, RANGE_BYTES, "[%s, %s]", shown[0], shown[1]);
+    (void)snprintf(text, RANGE_BYTES, "[%.28s, %.28s]", shown[0], shown[1]);
     return text;
 }
 

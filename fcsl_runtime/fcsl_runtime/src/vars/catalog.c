@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/nearest.h"
+
 static int by_path(const void *a, const void *b)
 {
     return strcmp(((const entry_t *)a)->path, ((const entry_t *)b)->path);
@@ -163,53 +165,6 @@ const char *fcsl_catalog_member(const entry_t *entry, const char *group)
 
 /* ---- the nearest name ---------------------------------------------------------------------------------------------- */
 
-/* Edits (insert, delete, replace) between two names, or `limit` when there are at least as many. */
-static uint32_t distance(const char *a, const char *b, uint32_t limit)
-{
-    uint32_t row[PATH_BYTES_MAX + 1];
-    const size_t width = strnlen(b, PATH_BYTES_MAX);
-    for (size_t j = 0; j <= width; j++) {
-        row[j] = (uint32_t)j;
-    }
-    for (size_t i = 0; a[i] != '\0' && i < PATH_BYTES_MAX; i++) {
-        uint32_t diagonal = row[0];
-        uint32_t best = row[0] = (uint32_t)i + 1;
-        for (size_t j = 1; j <= width; j++) {
-            const uint32_t replaced = diagonal + (a[i] != b[j - 1]);
-            const uint32_t inserted = row[j - 1] + 1;
-            const uint32_t deleted = row[j] + 1;
-            diagonal = row[j];
-            row[j] = replaced < inserted ? replaced : inserted;
-            row[j] = row[j] < deleted ? row[j] : deleted;
-            best = row[j] < best ? row[j] : best;
-        }
-        if (best >= limit) {
-            return limit;
-        }
-    }
-    return row[width] < limit ? row[width] : limit;
-}
-
-typedef struct {
-    const char *name;
-    uint32_t edits;
-} nearest_t;
-
-static void consider(nearest_t *nearest, const char *candidate, const char *name)
-{
-    const uint32_t edits = distance(name, candidate, nearest->edits);
-    if (edits < nearest->edits) {
-        *nearest = (nearest_t){.name = candidate, .edits = edits};
-    }
-}
-
-/* "" where nothing is like it: there is always a nearest, and nobody may have meant it. */
-static const char *if_like(const nearest_t *nearest, const char *name)
-{
-    const size_t longest = strlen(name) > strlen(nearest->name) ? strlen(name) : strlen(nearest->name);
-    return 4u * nearest->edits <= 3u * longest ? nearest->name : "";
-}
-
 /* Whether a path is `path` with more names at one of its dots: "att.rate.outputs.u", the field, where "att.outputs.u" is a port
  * of part "att". */
 static bool is_longer(const char *longer, const char *path)
@@ -233,47 +188,47 @@ const char *fcsl_catalog_nearest(const catalog_t *catalog, const char *path)
             return catalog->entries[i].path;
         }
     }
-    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    nearest_t nearest = fcsl_nearest_begin();
     for (uint32_t i = 0; i < catalog->count; i++) {
-        consider(&nearest, catalog->entries[i].path, path);
+        fcsl_nearest_consider(&nearest, catalog->entries[i].path, path);
     }
-    return if_like(&nearest, path);
+    return fcsl_nearest_if_like(&nearest, path);
 }
 
 const char *fcsl_nearest_state(const fcsl_machine_t *machine, const char *name)
 {
-    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    nearest_t nearest = fcsl_nearest_begin();
     for (uint32_t i = 0; i < machine->state_count; i++) {
-        consider(&nearest, machine->states[i].name, name);
+        fcsl_nearest_consider(&nearest, machine->states[i].name, name);
     }
-    return if_like(&nearest, name);
+    return fcsl_nearest_if_like(&nearest, name);
 }
 
 const char *fcsl_nearest_instance(const fcsl_machine_t *machine, const char *name)
 {
-    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    nearest_t nearest = fcsl_nearest_begin();
     for (uint32_t i = 0; i < machine->instance_count; i++) {
-        consider(&nearest, machine->instances[i].name, name);
+        fcsl_nearest_consider(&nearest, machine->instances[i].name, name);
     }
-    return if_like(&nearest, name);
+    return fcsl_nearest_if_like(&nearest, name);
 }
 
 const char *fcsl_nearest_sensor(const fcsl_machine_t *machine, const char *name)
 {
-    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    nearest_t nearest = fcsl_nearest_begin();
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         if (machine->channels[i].direction == FCSL_SENSOR) {
-            consider(&nearest, machine->channels[i].name, name);
+            fcsl_nearest_consider(&nearest, machine->channels[i].name, name);
         }
     }
-    return if_like(&nearest, name);
+    return fcsl_nearest_if_like(&nearest, name);
 }
 
 const char *fcsl_nearest(const char *const *names, const char *name)
 {
-    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    nearest_t nearest = fcsl_nearest_begin();
     for (size_t i = 0; names[i] != NULL; i++) {
-        consider(&nearest, names[i], name);
+        fcsl_nearest_consider(&nearest, names[i], name);
     }
-    return if_like(&nearest, name);
+    return fcsl_nearest_if_like(&nearest, name);
 }

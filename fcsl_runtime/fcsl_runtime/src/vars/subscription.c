@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "value.h"
 
-enum { FRAME_MARK = 0xff, FRAME_VERSION = 1, SCALAR_TEXT_BYTES = 32, SAMPLE_TEXT_BYTES = 160 };
+enum { FRAME_MARK = 0xff, FRAME_VERSION = 1, VALUE_TEXT_BYTES = 32, SAMPLE_TEXT_BYTES = 160 };
 
 static size_t scalars_of(const subscription_t *subscription, uint32_t i)
 {
@@ -35,7 +35,7 @@ size_t fcsl_subscription_bytes(const subscription_t *subscription)
     for (uint32_t i = 0; i < subscription->count; i++) {
         const int named = subscription->targets[i].field->type >= FCSL_TRANSITION_REQUEST;
         /* A bracket of each level may stand beside each scalar. */
-        const size_t scalar = (named ? PATH_BYTES_MAX : SCALAR_TEXT_BYTES) + 2u * RANK_MAX;
+        const size_t scalar = (named ? PATH_BYTES_MAX : VALUE_TEXT_BYTES) + 2u * RANK_MAX;
         /* A path that names a field has nothing that is escaped. */
         bytes += scalars_of(subscription, i) * scalar + strlen(subscription->paths + (size_t)i * PATH_BYTES_MAX) + 4u;
     }

@@ -5,18 +5,15 @@
 #define _GNU_SOURCE
 #include "value.h"
 
-#include <errno.h>
 #include <inttypes.h>
-#include <limits.h>
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
 #include "machine/enumerators.h"
+#include "machine/scalar_text.h"
 
-enum { VALUE_NAME_BYTES = 256, NUMBER_BYTES = 64 };
+enum { VALUE_NAME_BYTES = 256 };
 
 static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_t *out)
 {
@@ -81,14 +78,9 @@ void fcsl_value_write(const target_t *target, const uint8_t *field, json_out_t *
     write_axis(target, 0, target->view.offset, field, out);
 }
 
-static int is_integer_text(const char *text)
-{
-    return strpbrk(text, ".eE") == NULL;
-}
-
 static const char *read_float(const json_t *json, uint32_t token, uint8_t type, int floats, uint8_t *bytes)
 {
-    char text[NUMBER_BYTES];
+    char text[SCALAR_TEXT_BYTES];
     const json_token_t *number = &json->tokens[token];
     if (number->type == JSON_STRING) {
         if (fcsl_json_string(json, token, text, sizeof text) != 0 ||
@@ -98,92 +90,36 @@ static const char *read_float(const json_t *json, uint32_t token, uint8_t type, 
         if (floats == FINITE_ONLY) {
             return "not finite; say \"allow_non_finite\": true if that is meant";
         }
-    } else if (number->type == JSON_NUMBER && number->end - number->start < sizeof text) {
-        memcpy(text, json->text + number->start, number->end - number->start);
-        text[number->end - number->start] = '\0';
-    } else {
+        (void)fcsl_float_from_text(text, type, bytes);
+        return NULL;
+    }
+    if (number->type != JSON_NUMBER || number->end - number->start >= sizeof text) {
         return "expected a number";
     }
-    if (type == FCSL_F32) {
-        const float value = strtof(text, NULL);
-        if (number->type == JSON_NUMBER && isinf(value)) {
-            return "out of the range of f32";
-        }
-        memcpy(bytes, &value, sizeof value);
-    } else {
-        const double value = strtod(text, NULL);
-        if (number->type == JSON_NUMBER && isinf(value)) {
-            return "out of the range of f64";
-        }
-        memcpy(bytes, &value, sizeof value);
-    }
-    return NULL;
+    memcpy(text, json->text + number->start, number->end - number->start);
+    text[number->end - number->start] = '\0';
+    return fcsl_float_from_text(text, type, bytes);
 }
 
 static const char *read_integer(const json_t *json, uint32_t token, uint8_t type, uint8_t *bytes)
 {
-    char text[NUMBER_BYTES];
+    char text[SCALAR_TEXT_BYTES];
     const json_token_t *number = &json->tokens[token];
     if (number->type != JSON_NUMBER || number->end - number->start >= sizeof text) {
         return "expected an integer";
     }
     memcpy(text, json->text + number->start, number->end - number->start);
     text[number->end - number->start] = '\0';
-    if (!is_integer_text(text)) {
-        return "expected an integer, without point or exponent";
-    }
-    errno = 0;
-    if (type == FCSL_U64 || type == FCSL_U32) {
-        const unsigned long long value = text[0] == '-' ? 0 : strtoull(text, NULL, 10);
-        if (text[0] == '-' || errno != 0 || (type == FCSL_U32 && value > UINT32_MAX)) {
-            return type == FCSL_U32 ? "out of the range of u32" : "out of the range of u64";
-        }
-        const uint32_t narrow = (uint32_t)value;
-        memcpy(bytes, type == FCSL_U32 ? (const void *)&narrow : (const void *)&value, fcsl_scalar_size(type));
-        return NULL;
-    }
-    const long long value = strtoll(text, NULL, 10);
-    if (errno != 0 || (type == FCSL_I32 && (value < INT32_MIN || value > INT32_MAX))) {
-        return type == FCSL_I32 ? "out of the range of i32" : "out of the range of i64";
-    }
-    const int32_t narrow = (int32_t)value;
-    memcpy(bytes, type == FCSL_I32 ? (const void *)&narrow : (const void *)&value, fcsl_scalar_size(type));
-    return NULL;
-}
-
-/* The request of this name, as it is read back ("tr_GO") or else as algorithms write it ("GO"); FCSL_NONE: none. */
-static int32_t request_of(const fcsl_machine_t *machine, const char *text)
-{
-    int32_t plain = FCSL_NONE;
-    for (uint32_t i = 0; i < machine->request_count; i++) {
-        if (strncmp(text, "tr_", 3) == 0 && strcmp(text + 3, machine->requests[i]) == 0) {
-            return (int32_t)i + 1;
-        }
-        if (strcmp(text, machine->requests[i]) == 0) {
-            plain = (int32_t)i + 1;
-        }
-    }
-    return text[0] == '\0' ? 0 : plain;
+    return fcsl_integer_from_text(text, type, bytes);
 }
 
 static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *json, uint32_t token, uint8_t type,
                                    uint8_t *bytes)
 {
     char text[VALUE_NAME_BYTES];
-    if (fcsl_json_string(json, token, text, sizeof text) != 0) {
-        return "expected a name";
-    }
-    int32_t value = FCSL_NONE;
-    if (type == FCSL_HEALTH) {
-        value = fcsl_enumerator_find(machine, type, text, strlen(text));
-    } else {
-        value = request_of(machine, text);
-    }
-    if (value == FCSL_NONE) {
-        return "no such enumerator";
-    }
-    memcpy(bytes, &value, sizeof value);
-    return NULL;
+    return fcsl_json_string(json, token, text, sizeof text) != 0
+               ? "expected a name"
+               : fcsl_enumerator_from_text(machine, text, type, bytes);
 }
 
 static const char *read_scalar(const target_t *target, const json_t *json, uint32_t token, int floats, uint8_t *bytes)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -13,7 +14,8 @@ from ..c_machine import CMachine
 from ..descriptor import Machine
 from ..errors import TwinError
 from ..hardware import Hardware, RunBoard
-from ..machine_build import build_config
+from ..machine_build import build_config, find_parameters
+from ..parameters import Given, Parameters
 from ..paths import Selection
 from ..run import Run, RunTrace, open_run
 from .python_run import open_python_run
@@ -48,13 +50,16 @@ class AlgTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
-        return cls(open_run(*build_config(config, target, instances, backend)))
+    def _open_config(
+        cls, config: Path, target: str, instances: Sequence[str] | None, backend: str, parameters: Parameters | None
+    ) -> Self:
+        return cls(open_run(*build_config(config, target, instances, backend), parameters))
 
     @classmethod
-    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
-        """Opens a compiled library; `machine` selects one of several. Raises TwinError."""
-        return cls(open_run(Path(path).absolute(), machine))
+    def from_library(cls, path: str | Path, machine: str | None = None, *, parameters: Given | None = None) -> Self:
+        """Opens a compiled library; `machine` selects one of several, `parameters` are as in from_config. Raises TwinError."""
+        values = find_parameters(parameters, sys._getframe(1).f_code.co_filename)
+        return cls(open_run(Path(path).absolute(), machine, values))
 
     def close(self) -> None:
         try:
@@ -240,10 +245,13 @@ class PyTwin(AlgTwin):
     """
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
-        return cls(open_python_run(config, *build_config(config, target, instances, backend), target, instances))
+    def _open_config(
+        cls, config: Path, target: str, instances: Sequence[str] | None, backend: str, parameters: Parameters | None
+    ) -> Self:
+        library, name = build_config(config, target, instances, backend)
+        return cls(open_python_run(config, library, name, target, instances, parameters))
 
     @classmethod
-    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
+    def from_library(cls, path: str | Path, machine: str | None = None, *, parameters: Given | None = None) -> Self:
         """Always raises TwinError: a library has no sources to run."""
         raise TwinError(f"{path}: PyTwin runs the algorithms' sources; open the machine's JSON with from_config()")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..c_machine import CMachine
 from ..errors import TwinError
+from ..parameters import CParameters
 from ..run import Run
 
 if TYPE_CHECKING:
@@ -184,7 +185,8 @@ class _Kept:
         pass
 
 
-_Init = CFUNCTYPE(c_int32, ptr)
+_Init = CFUNCTYPE(None, ptr)
+_Start = CFUNCTYPE(c_int32, ptr)
 _Step = CFUNCTYPE(None, ptr, ptr)
 _ForceState = CFUNCTYPE(None, ptr, c_int32)
 
@@ -194,19 +196,23 @@ class _Playback(Run):
 
     def __init__(self, descriptor: CMachine, before: bytes, data: bytes | bytearray):
         self._before, self._rows, self._next, self._size = before, data, 0, descriptor.size
-        self._callbacks = (_Init(self._init), _Step(self._tick), _ForceState(lambda memory, state: None))
+        self._callbacks = {
+            "init": _Init(self._init),
+            "start": _Start(lambda memory: 0),
+            "step": _Step(self._tick),
+            "force_state": _ForceState(lambda memory, state: None),
+        }
         self._played = CMachine.from_buffer_copy(descriptor)
-        for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
+        for name, callback in self._callbacks.items():
             setattr(self._played, name, ctypes.cast(callback, ptr).value)
         super().__init__(Path(), None)
 
-    def _open(self, library: Path, machine: str | None) -> int | None:
-        handle: int | None = self._lib.fcsl_run_open_machine(byref(self._played), byref(self._error))
+    def _open(self, library: Path, machine: str | None, parameters: CParameters | None) -> int | None:
+        handle: int | None = self._lib.fcsl_run_open_machine(byref(self._played), parameters, byref(self._error))
         return handle
 
-    def _init(self, memory: int) -> int:
+    def _init(self, memory: int) -> None:
         memmove(memory, self._before, self._size)
-        return 0
 
     def _tick(self, memory: int, host: int) -> None:
         memmove(memory, bytes(self._rows[self._next : self._next + self._size]), self._size)

@@ -16,6 +16,7 @@ from typing import IO
 from ..errors import TwinError
 from ..fork_safety import FORKED, for_children, not_for_children
 from ..library import runtime_program
+from ..parameters import Parameters
 from ..private_folder import PrivateFolder
 from ..vars.client import VarClient
 from ..vars.wire import VarError
@@ -35,7 +36,7 @@ class FlightProcess:
     A pipe ensures the latter: the kernel closes its other end. Ctrl-C on a terminal does not reach the program.
     """
 
-    def __init__(self, library: Path, machine: str):
+    def __init__(self, library: Path, machine: str, parameters: Parameters | None = None):
         self._stderr: IO[bytes] = tempfile.TemporaryFile()
         self._client: VarClient | None = None
         self._without = "the twin is closed"
@@ -50,6 +51,10 @@ class FlightProcess:
                 "--no-overrun-check",
                 "--exit-on-stdin-eof",
             ]
+            if parameters is not None:
+                copy = folder.inside("p") / "parameters.yaml"
+                copy.write_bytes(parameters.text)
+                options += ["--parameters", str(copy)]
             self._child = subprocess.Popen(
                 [str(runtime_program("fcsl-fc")), str(library), *options],
                 stdin=subprocess.PIPE,

@@ -8,6 +8,7 @@ tick costs a round trip to the other process. The values of one `set` have at mo
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -18,7 +19,8 @@ from ..checkpoint import struct_of, tick_of
 from ..descriptor import Field, Machine
 from ..errors import TwinError
 from ..hardware import Hardware
-from ..machine_build import build_config
+from ..machine_build import build_config, find_parameters
+from ..parameters import Given, Parameters
 from ..paths import Selection
 from ..run import Run, open_run
 from ..values import decode
@@ -41,10 +43,10 @@ _TAPPED_TICKS = 200
 class ProcessTwin(Twin):
     """Owns a flight program, which starts paused at tick 0 and ends with the twin or with this process."""
 
-    def __init__(self, library: Path, machine: str | None):
+    def __init__(self, library: Path, machine: str | None, parameters: Parameters | None = None):
         super().__init__()
-        # Only the descriptor of this run is used: offsets and types of fields.
-        self._described: Run = open_run(library, machine)
+        # Only the descriptor of this run is used: offsets and types of fields. It refuses wrong parameters, too.
+        self._described: Run = open_run(library, machine, parameters)
         self._running = False
         self._skipped = 0
         self._ticks_skipped = 0
@@ -53,7 +55,7 @@ class ProcessTwin(Twin):
         #: A cached copy of the machine struct; None after a change.
         self._known: bytes | None = None
         try:
-            self._process = FlightProcess(library, self._described.machine.name)
+            self._process = FlightProcess(library, self._described.machine.name, parameters)
         except OSError as error:
             raise TwinError(f"cannot start a flight program: {error.strerror}") from None
         hosted = self._request("describe")["build_hash"]
@@ -64,13 +66,16 @@ class ProcessTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
-        return cls(*build_config(config, target, instances, backend))
+    def _open_config(
+        cls, config: Path, target: str, instances: Sequence[str] | None, backend: str, parameters: Parameters | None
+    ) -> Self:
+        return cls(*build_config(config, target, instances, backend), parameters)
 
     @classmethod
-    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
-        """Opens a compiled library; `machine` selects one of several. Raises TwinError."""
-        return cls(Path(path).absolute(), machine)
+    def from_library(cls, path: str | Path, machine: str | None = None, *, parameters: Given | None = None) -> Self:
+        """Opens a compiled library; `machine` selects one of several, `parameters` are as in from_config. Raises TwinError."""
+        values = find_parameters(parameters, sys._getframe(1).f_code.co_filename)
+        return cls(Path(path).absolute(), machine, values)
 
     def close(self) -> None:
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run of a machine in CPython: the descriptor of the compiled machine, whose three functions call the reference.
+"""A run of a machine in CPython: the descriptor of the compiled machine, whose functions call the reference.
 
 Everything else (writes, checkpoints, recording, channels) is the same fcsl_run, working on the same flat memory.
 """
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..c_machine import NO_OFFSET, CMachine, CMonitor
 from ..descriptor import Machine, read_machine
 from ..errors import TwinError
+from ..parameters import CParameters, Parameters
 from ..run import Run
 
 if TYPE_CHECKING:
@@ -48,7 +49,8 @@ class CHost(Structure):
     ]
 
 
-_Init = CFUNCTYPE(c_int32, ptr)
+_Init = CFUNCTYPE(None, ptr)
+_Start = CFUNCTYPE(c_int32, ptr)
 _Step = CFUNCTYPE(None, ptr, ptr)
 _ForceState = CFUNCTYPE(None, ptr, c_int32)
 _MACHINES_MAX = 1024
@@ -170,10 +172,15 @@ class PythonMachine:
         self._address, self._memory = 0, memoryview(b"")
         self._host: _Host | None = None
         self.failure: BaseException | None = None
-        self._callbacks = (_Init(self._init), _Step(self._step), _ForceState(self._force_state))
+        self._callbacks = {
+            "init": _Init(self._init),
+            "start": _Start(self._start),
+            "step": _Step(self._step),
+            "force_state": _ForceState(self._force_state),
+        }
         self.descriptor = CMachine.from_buffer_copy(compiled)
         self.descriptor.stack_bytes = 0  # Python keeps its arrays elsewhere
-        for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
+        for name, callback in self._callbacks.items():
             setattr(self.descriptor, name, ctypes.cast(callback, ptr).value)
 
     def _memory_at(self, address: int) -> memoryview:
@@ -190,10 +197,15 @@ class PythonMachine:
         except BaseException as error:
             self.failure = error
 
-    def _init(self, address: int) -> int:
-        status = -1
+    def _init(self, address: int) -> None:
         with self._kept():
-            status = self._reference.init(self._memory_at(address))
+            self._reference.init(self._memory_at(address))
+
+    def _start(self, address: int) -> int:
+        status = -1
+        if self.failure is None:
+            with self._kept():
+                status = self._reference.start(self._memory_at(address))
         return status
 
     def _step(self, address: int, host: int) -> None:
@@ -227,10 +239,17 @@ class PythonRun(Run):
     """A run of a PythonMachine. Exceptions of user code propagate out of the call that ran it. `make_monitor`: of the
     machine's requirements; None without."""
 
-    def __init__(self, library: Path, name: str, make_reference: MakeReference, make_monitor: MakeReference | None):
+    def __init__(
+        self,
+        library: Path,
+        name: str,
+        make_reference: MakeReference,
+        make_monitor: MakeReference | None,
+        parameters: Parameters | None = None,
+    ):
         self._python = _python_machine(find_descriptor(library, name), make_reference)
         self._machines = [self._python]
-        super().__init__(library, name)
+        super().__init__(library, name, parameters)
         compiled = find_monitor(library, name)
         if make_monitor is not None and compiled is not None:
             self._machines.append(_python_machine(compiled.machine.contents, make_monitor))
@@ -238,8 +257,9 @@ class PythonRun(Run):
             self._monitor.machine = ctypes.pointer(self._machines[-1].descriptor)
             self._check(self._lib.fcsl_run_use_monitor(self.handle(), byref(self._monitor), byref(self._error)))
 
-    def _open(self, library: Path, machine: str | None) -> int | None:
-        handle: int | None = self._lib.fcsl_run_open_machine(byref(self._python.descriptor), byref(self._error))
+    def _open(self, library: Path, machine: str | None, parameters: CParameters | None) -> int | None:
+        descriptor, error = byref(self._python.descriptor), byref(self._error)
+        handle: int | None = self._lib.fcsl_run_open_machine(descriptor, parameters, error)
         return handle
 
     def _check(self, status: int) -> None:
@@ -256,11 +276,16 @@ class PythonRun(Run):
 
 
 def open_python_run(
-    config: Path, library: Path, name: str, target: str, instances: Sequence[str] | None = None
+    config: Path,
+    library: Path,
+    name: str,
+    target: str,
+    instances: Sequence[str] | None = None,
+    parameters: Parameters | None = None,
 ) -> PythonRun:
     """Runs the machine JSON `config` in CPython, with the descriptor of its compiled library for `target`.
 
-    `instances`: those of a subset machine. Raises TwinError.
+    `instances`: those of a subset machine. `parameters`: with which it begins. Raises TwinError.
     """
     from fcsl_compiler.api.build import ToolchainError, toolchain
     from fcsl_compiler.api.diagnostics import DiagnosticError
@@ -284,4 +309,5 @@ def open_python_run(
         name,
         lambda layout, places: ReferenceMachine(checked, layout, places, externs),
         None if monitor is None else lambda layout, places: ReferenceMachine(monitor.checked, layout, places, None),
+        parameters,
     )

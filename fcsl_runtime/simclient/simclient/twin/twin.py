@@ -23,7 +23,8 @@ from ..checkpoint import read_checkpoint, write_checkpoint
 from ..descriptor import Channel, Field, Instance, why_read_only
 from ..errors import TwinError, did_you_mean
 from ..fp_mode import ieee_mode
-from ..machine_build import find_config
+from ..machine_build import find_config, find_parameters
+from ..parameters import Given, Parameters
 from ..paths import Selection, Struct, StructArray
 from ..values import Value, encode_part, read_part, whole_number
 from .condition import Condition
@@ -51,21 +52,36 @@ class Twin(TwinFaults):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_config(cls, path: str | Path, target: str = "simulation", backend: str = "c") -> Self:
+    def from_config(
+        cls,
+        path: str | Path,
+        target: str = "simulation",
+        backend: str = "c",
+        *,
+        parameters: Given | None = None,
+    ) -> Self:
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
         `path` is relative to the working directory, or else to the caller's file. `target` selects one of the machine's
         `targets`, from which its externs are linked. `backend` ("c" or "nim") is the language that the compiler writes;
-        the machine is the same. Raises TwinError, with the compiler's diagnostics if the config or an algorithm is
+        the machine is the same. `parameters`: values with which it begins instead of the compiled ones, as a parameter file
+        or by name: {"pilot.gain": 3.0}. Raises TwinError, with the compiler's diagnostics if the config or an algorithm is
         wrong.
         """
-        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        caller = sys._getframe(1).f_code.co_filename
+        config, values = find_config(path, caller), find_parameters(parameters, caller)
         with ieee_mode():
-            return cls._open_config(config, target, None, backend)
+            return cls._open_config(config, target, None, backend, values)
 
     @classmethod
     def from_instances(
-        cls, path: str | Path, instances: Sequence[str], target: str = "simulation", backend: str = "c"
+        cls,
+        path: str | Path,
+        instances: Sequence[str],
+        target: str = "simulation",
+        backend: str = "c",
+        *,
+        parameters: Given | None = None,
     ) -> Self:
         """Opens only these instances, with the connections, channels, states and transitions between them.
 
@@ -79,13 +95,16 @@ class Twin(TwinFaults):
             raise TwinError(f'from_instances(…, "{instances}"): a list of names wanted: ["{instances}"]')
         if not isinstance(instances, Sequence) or not all(isinstance(name, str) for name in instances):
             raise TwinError(f"from_instances(…, {instances!r}): a list of names of instances wanted")
-        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        caller = sys._getframe(1).f_code.co_filename
+        config, values = find_config(path, caller), find_parameters(parameters, caller)
         with ieee_mode():
-            return cls._open_config(config, target, tuple(instances), backend)
+            return cls._open_config(config, target, tuple(instances), backend, values)
 
     @classmethod
     @abstractmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
+    def _open_config(
+        cls, config: Path, target: str, instances: Sequence[str] | None, backend: str, parameters: Parameters | None
+    ) -> Self:
         """Compiles and opens a machine JSON, or the subset machine of `instances`."""
 
     def __enter__(self) -> Self:

@@ -123,12 +123,17 @@ static const fcsl_channel_t channels[] = {
 #endif
 };
 
-static int32_t init(void *machine)
+static void init(void *machine)
 {
     guarded_t *m = machine;
     memset(m, 0, sizeof *m);
     m->current = FCSL_NONE;
     m->health = FCSL_STALE;
+}
+
+static int32_t start(void *machine)
+{
+    (void)machine;
     return 0;
 }
 
@@ -196,6 +201,7 @@ static const fcsl_machine_t guarded = {
     .command_timeout_ns = TIMEOUT_NS,
     .views = "",
     .init = init,
+    .start = start,
     .step = step,
     .force_state = force_state,
 };

@@ -39,7 +39,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     bytes_t bytes = {data, size};
     fcsl_error_t error = {{0}};
     const fcsl_machine_t *machine = fcsl_machines[take_number(&bytes, 1) % machines];
-    fcsl_run_t *run = fcsl_run_open_machine(machine, &error);
+    fcsl_run_t *run = fcsl_run_open_machine(machine, NULL, &error);
     FUZZ_CHECK(run != NULL && fcsl_run_step(run, 2, &error) == 0);
     uint8_t *before = saved_copy(run, machine->size);
     uint8_t *image = saved_copy(run, machine->size);

@@ -71,7 +71,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fcsl_error_t error = {{0}};
     const uint64_t number = take_number(&bytes, 1);
     const unsigned how = (unsigned)take_number(&bytes, 1);
-    fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[number % machines], &error);
+    fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[number % machines], NULL, &error);
     FUZZ_CHECK(run != NULL && fcsl_run_step(run, 2, &error) == 0);
     size_t before_size = 0;
     uint8_t *before = saved(run, &before_size);

@@ -13,7 +13,12 @@ extern const fcsl_machine_t *const fcsl_machines[];
 
 static uint32_t tick_offset;
 
-static int32_t initialise(void *machine)
+static void initialise(void *machine)
+{
+    (void)machine;
+}
+
+static int32_t start(void *machine)
 {
     (void)machine;
     return 0;
@@ -58,6 +63,7 @@ static void copy_tables(tables_t *t)
     COPY(transitions, transition_count);
     COPY(channels, channel_count);
     t->machine.init = initialise;
+    t->machine.start = start;
     t->machine.step = step;
     t->machine.force_state = force_state;
 }
@@ -232,7 +238,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         patch(&bytes, t);
     }
     tick_offset = t->machine.tick_offset;
-    fcsl_run_t *run = fcsl_run_open_machine(&t->machine, &error);
+    fcsl_run_t *run = fcsl_run_open_machine(&t->machine, NULL, &error);
     FUZZ_CHECK((run == NULL) == (error.text[0] != '\0'));
     if (run != NULL) {
         host(run, &t->machine, &bytes);

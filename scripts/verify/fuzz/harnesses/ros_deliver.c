@@ -58,7 +58,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static const uint32_t channels[] = {0};
     bytes_t bytes = {data, size};
     fcsl_error_t error;
-    fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[0], &error);
+    fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[0], NULL, &error);
     fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&CONVERSION, &error);
     FUZZ_CHECK(run != NULL && reader != NULL && fcsl_run_attach(run, &error) == 0);
     fcsl_sample_input_t *input = fcsl_sample_input_new(run, reader, channels, 1, &error);

@@ -84,7 +84,7 @@ static fcsl_vars_block_t hosted_block(void)
 static void hosted_open(void)
 {
     fcsl_error_t error;
-    hosted.run = fcsl_run_open_machine(fcsl_machines[0], &error);
+    hosted.run = fcsl_run_open_machine(fcsl_machines[0], NULL, &error);
     FUZZ_CHECK(hosted.run != NULL);
     const fcsl_part_t part = {.data = fcsl_run_data(hosted.run), .size = fcsl_machines[0]->size};
     FUZZ_CHECK(fcsl_history_open(&hosted.history, &part, 1, HISTORY_SLOTS) == 0);
