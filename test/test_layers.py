@@ -38,6 +38,7 @@ FOLDERS: dict[str, Sequence[str]] = {
             "coverage",
             "requirements",
             "driver",
+            "firmware",
         ),
         *("board", "graph", "build_report", "reference", "prove", "cli", "api"),
     ),

@@ -111,9 +111,15 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "each channel under its key, with zenoh:tcp:HOST:PORT, or zenoh-client: where another simulation listens; with "
         ",free-running behind that, neither waits for the other",
     )
+    command.add_argument(
+        "--pil",
+        metavar="PROCESSOR",
+        help="processor in the loop (docs/hardware/firmware.md): fly with the controller on qemu:mps2-an500, which is built and started, or "
+        "on the board at uart:DEVICE:BAUD; compare with the flight of this process",
+    )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
-    help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
+    help_timeout = f"seconds to wait for the external controller, or the processor (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="SECONDS", help=help_timeout)
     command.add_argument("--restore", type=Path, metavar="FILE", help="go on from this checkpoint of the simulation")
     help_save = "write a checkpoint at the end (docs/guide/recording.md), whose time --duration chooses"

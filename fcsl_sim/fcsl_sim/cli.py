@@ -9,7 +9,7 @@ from .arguments import parse
 
 
 def main(arguments: Sequence[str] | None = None, program: str = "") -> int:
-    """Runs fcsl-sim. `program`: what messages about usage call the command, if it is a verb of `fcsl`. Exit status: 0 if the run completed, 1 if `until` has not held in it, 2 for wrong input, 130 on SIGINT, 143 on
+    """Runs fcsl-sim. `program`: what messages about usage call the command, if it is a verb of `fcsl`. Exit status: 0 if the run completed, 1 if `until` has not held in it or a processor flew another flight, 2 for wrong input, 130 on SIGINT, 143 on
     SIGTERM; the bag is then complete with the ticks done so far.
     """
     options = parse(arguments, program)

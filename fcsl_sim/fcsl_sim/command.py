@@ -27,6 +27,7 @@ from .runner import Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_ERRORS = 1
+EXIT_DIFFERENT = 1
 EXIT_BAD_INPUT = 2
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
@@ -199,10 +200,13 @@ def _run(options: argparse.Namespace) -> int:
             "`--namespace` needs `--record`, `--observers`, `--ros` or `--external zenoh:…`: it is of topics, and of keys "
             "of the bus"
         )
-    if options.timeout is not None and external is None:
-        raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
+    if options.timeout is not None and external is None and options.pil is None:
+        raise SimError("`--timeout` needs `--external` or `--pil`: it limits the wait for the controller")
     if options.timeout is not None and external is not None and external.endswith(FREE_RUNNING):
         raise SimError("`--timeout` does not go with `,free-running`: nobody waits for the controller")
+    timeout_ms = TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000)))
+    if options.pil is not None:
+        return _fly_on_processor(options, timeout_ms)
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -212,7 +216,7 @@ def _run(options: argparse.Namespace) -> int:
         bag=options.record,
         name_space=options.namespace,
         external=external,
-        timeout_ms=TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000))),
+        timeout_ms=timeout_ms,
         speed=options.speed,
         server=server,
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
@@ -227,6 +231,31 @@ def _run(options: argparse.Namespace) -> int:
     else:
         _print_summary(config, summary)
     return EXIT_UNTIL_NOT_HELD if summary.until_held is False else 0
+
+
+#: Options of `run` that need a flight which is not compared with another.
+_ONE_FLIGHT = ("external", "record", "socket", "telemetry", "observers", "ros", "restore", "save", "speed")
+
+
+def _fly_on_processor(options: argparse.Namespace, timeout_ms: int) -> int:
+    from .pil import check_peer, compare
+
+    check_peer(options.pil)
+    others = [f"`--{name}`" for name in _ONE_FLIGHT if getattr(options, name)]
+    if others:
+        raise SimError(
+            f"`--pil` flies twice and compares; it does not go with {', '.join(others)}. A board on a serial line flies once with "
+            "`--external wire:uart:DEVICE:BAUD`"
+        )
+    found = compare(_load(options), options.pil, timeout_ms)
+    if options.json:
+        show(json.dumps(found.as_json(), indent=2))
+    else:
+        for name, flight in (("in this process", found.here), (f"on {found.peer}", found.there)):
+            fields = f", fields {flight.fields}" if flight.fields else ""
+            show(f"{name}: {len(flight.truth)} ticks in {flight.seconds:.3f} s, truth {flight.digest}{fields}")
+        show(f"the flights differ: {found.difference}" if found.difference else "the flights are the same, bit for bit")
+    return EXIT_DIFFERENT if found.difference else 0
 
 
 class _Printer(Watcher):

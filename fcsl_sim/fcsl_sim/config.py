@@ -75,7 +75,8 @@ _OPTIONAL = ("parameters", "inputs", "integrator", "tolerances")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages
+    `controller` is the name of the first controller, `machine_file` its JSON (None if it came compiled), `companions` are those
+    beside it. `ros` lists the standard messages
     onto which truth is mapped; `until` is the stop condition as text, empty without one; `warnings` are rendered texts.
     `arguments` are those of `load`, besides path, seed and duration: another file is read as this one was.
     """
@@ -86,6 +87,7 @@ class SimConfig:
     controller: str
     machine: Machine
     library: Path
+    machine_file: Path | None
     companions: dict[str, Controller]
     seed: int
     ticks: int
@@ -221,6 +223,7 @@ class _Loader:
         self.reader = ConfigReader(sink)
         self.parts = _Parts()
         self.link_node: JsonNode | None = None
+        self.machine_files: dict[Path, Path] = {}  # JSON of each library that was built
         self.foreign: list[Diagnostic] = []  # diagnostics of the machine's files
         self.settings = Settings(arguments["sets"], sink)
 
@@ -297,6 +300,7 @@ class _Loader:
             controller,
             lead.machine,
             lead.library,
+            self.machine_files.get(lead.library),
             dict(list(parts.controllers.items())[1:]),
             parts.seed,
             parts.ticks,
@@ -380,6 +384,7 @@ class _Loader:
         if not path.is_file():
             raise SourcePathError(f"no such file: {path}")
         built = build_machine(path, backend=self.backend)
+        self.machine_files[built.library] = path
         return built.library, built.name
 
     def _read_duration(self, node: JsonNode | None, given_s: Fraction | None) -> None:

@@ -152,6 +152,12 @@ def _add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     build.add_argument(
         "--instances", metavar="NAME,…", help="build a subset machine with only these instances (one config)"
     )
+    build.add_argument(
+        "--processor",
+        metavar="PROCESSOR",
+        help="build a static library for a processor without an operating system (docs/hardware/firmware.md): cortex-m7, "
+        'cortex-m4, or a C compiler and its options, as "arm-none-eabi-gcc -mcpu=cortex-m33 -mthumb"',
+    )
     build.add_argument("--strict", action="store_true", help=_STRICT_HELP)
     build.add_argument("--dump", choices=DUMPS, help="print the result of a pass, or the types of locals, and stop")
     what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load"

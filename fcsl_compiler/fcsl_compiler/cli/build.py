@@ -24,6 +24,8 @@ from .report import Summary, print_extern_calls, print_report
 
 
 def run(options: argparse.Namespace) -> int:
+    if options.dump and options.processor:
+        raise UsageError("--dump prints the result of a pass, which is that of every processor; remove --processor")
     if options.dump and options.format != "text":
         raise UsageError("--dump prints the result of a pass; it has no --json or --sarif")
     if options.dump and options.report:
@@ -44,6 +46,10 @@ def run(options: argparse.Namespace) -> int:
     if options.name is not None and not is_machine_name(options.name):
         raise UsageError(f"--name `{options.name}` is not a valid library name: lower_snake_case, not a keyword of C")
     refuse_file(folder)
+    if options.processor is not None:
+        from .firmware import build
+
+        return build(options, options.output, options.name or first.stem, instances)
     if options.report and options.c_only:
         raise UsageError("--report needs compiled machines; remove --c-only")
     if options.report and options.format == "sarif":

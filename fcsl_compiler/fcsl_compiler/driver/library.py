@@ -41,7 +41,7 @@ def emit(
     for c in compilations:
         with explained(sorted(e.name for e in c.checked.externs), [c.target]):
             check_externs(c.target.sources, c.checked.externs)  # whoever compiles the C does not compare their types
-    _write(compilations, folder)
+    write_sources(compilations, folder)
     return compilations
 
 
@@ -63,11 +63,12 @@ def compile_all(
     ]
     for c in compilations:
         compile_monitor(c)
-    _distinct(compilations)
+    check_distinct(compilations)
     return compilations
 
 
-def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
+def write_sources(compilations: list[Compilation], folder: Path) -> list[Path]:
+    """Writes all that `emit` lists, and returns the files."""
     texts: dict[str, str] = {}
     everything = [*compilations, *(c.monitor_code for c in compilations if c.monitor_code is not None)]
     for c in everything:
@@ -88,7 +89,8 @@ def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
     return [folder / file for file in texts]
 
 
-def _distinct(compilations: list[Compilation]) -> None:
+def check_distinct(compilations: list[Compilation]) -> None:
+    """Checks that machines can share a library. Raises DiagnosticError."""
     seen: dict[str, Compilation] = {}
     for c in [*compilations, *(c.monitor_code for c in compilations if c.monitor_code is not None)]:
         name = c.checked.name
@@ -140,10 +142,10 @@ def build_library(
         # Library and C files appear together. After an error the folder is unchanged.
         with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
             folder = Path(scratch)
-            written = _write(compilations, folder)
+            written = write_sources(compilations, folder)
             _compile(compilations, [file for file in written if file.suffix == ".c"], folder / output.name, inspect)
             for file in (*written, folder / output.name):
-                _move(file, output.parent / file.name)
+                move(file, output.parent / file.name)
     except BaseException:
         for folder in absent:
             with contextlib.suppress(OSError):
@@ -192,7 +194,7 @@ def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:
     return {name: bound for name, bound in bounds.items() if bound is not None}
 
 
-def _move(made: Path, target: Path) -> None:
+def move(made: Path, target: Path) -> None:
     """Leaves equal files untouched, so that make and ninja do not rebuild."""
     if not (target.is_file() and target.read_bytes() == made.read_bytes()):
         made.replace(target)

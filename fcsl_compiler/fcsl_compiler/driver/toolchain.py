@@ -64,12 +64,7 @@ class Language(NamedTuple):
     def compiler(self) -> list[str]:
         """The compiler command. Raises ToolchainError for options that change results."""
         given = shlex.split(os.environ.get(self.variable, ""))
-        changing = [word for word in given if word in _CHANGES_BITS]
-        if changing:
-            raise ToolchainError(
-                f"{self.variable} has {changing[0]}, which changes results: machines and models have the same bits "
-                "everywhere; remove it"
-            )
+        refuse_inexact(given, self.variable)
         if given or not self.zig or shutil.which(self.command):
             return given or [self.command]
         return zig_compiler(self.zig) or [self.command]
@@ -79,6 +74,15 @@ class Language(NamedTuple):
         or_zig = " or the Python package ziglang (python3 -m pip install ziglang)" if self.zig else ""
         fix = f"install {self.package}{or_zig}, or set {self.variable}"
         return ToolchainError(f"no {self.name} compiler: `{command}` does not run; {fix}")
+
+
+def refuse_inexact(words: Sequence[str], where: str) -> None:
+    """Raises ToolchainError for an option of a compiler that changes results."""
+    changing = [word for word in words if word in _CHANGES_BITS]
+    if changing:
+        raise ToolchainError(
+            f"{where} has {changing[0]}, which changes results: machines and models have the same bits everywhere; remove it"
+        )
 
 
 def zig_compiler(name: str) -> list[str]:
@@ -287,18 +291,19 @@ def as_argument(path: Path) -> str:
     return f"./{path}" if str(path).startswith("-") else str(path)
 
 
-def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path) -> list[Path]:
+def compile_objects(
+    sources: Sequence[Path], includes: Sequence[Path], folder: Path, command: Sequence[str] = ()
+) -> list[Path]:
     """Compiles each C source to an object in `folder`, with its call graph beside it if the compiler writes them.
+    `command`: another compiler, with its flags.
 
     Raises ToolchainError with the compiler's output.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    flags = [*FLAGS, *call_graph_flags(tuple(compiler())), *(f"-I{d}" for d in includes)]
+    line = [*(command or (*compiler(), *FLAGS, *call_graph_flags(tuple(compiler())))), *(f"-I{d}" for d in includes)]
     # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
-    run_compilers(
-        [[*compiler(), *flags, "-c", as_argument(s), "-o", str(made)] for s, made in zip(sources, objects, strict=True)]
-    )
+    run_compilers([[*line, "-c", as_argument(s), "-o", str(made)] for s, made in zip(sources, objects, strict=True)])
     return objects
 
 

@@ -25,17 +25,17 @@ static void print_number(uint64_t value, uint32_t base)
         text[at] = "0123456789abcdef"[value % base];
         value /= base;
     } while (value != 0u && at > 0u);
-    platform_print(text + at);
+    board_print(text + at);
 }
 
 static void print_row(const char *what, uint64_t number, uint64_t hash)
 {
-    platform_print(what);
-    platform_print(" ");
+    board_print(what);
+    board_print(" ");
     print_number(number, 10u);
-    platform_print(" ");
+    board_print(" ");
     print_number(hash, 16u);
-    platform_print("\n");
+    board_print("\n");
 }
 
 static uint64_t parse(const char *text)
@@ -103,14 +103,14 @@ static int is_named(const char *name, const char *wanted)
 int main(int argc, char **argv)
 {
     if (argc < 5) {
-        platform_print("bits: MODE MACHINE SEED TICKS [MARK...] are missing\n");
+        board_print("bits: MODE MACHINE SEED TICKS [MARK...] are missing\n");
         return 2;
     }
     for (uint32_t i = 0; fcsl_machines[i] != NULL; i++) {
         const fcsl_machine_t *d = fcsl_machines[i];
         if ((is_named("all", argv[2]) || is_named(d->name, argv[2])) && run(d, argc, argv) != 0) {
-            platform_print(d->name);
-            platform_print(": does not begin, or is too large\n");
+            board_print(d->name);
+            board_print(": does not begin, or is too large\n");
             return 1;
         }
     }

@@ -3,7 +3,7 @@
 
 #include "bits.h"
 
-void platform_print(const char *text)
+void board_print(const char *text)
 {
     (void)fputs(text, stdout);
 }

@@ -16,7 +16,9 @@ from fcsl_compiler.driver.toolchain import FLAGS, include_dirs, math_library
 from ..shared.cases import OUT, ROOT, SHARED, CheckFailed, run
 
 HERE = Path(__file__).resolve().parent
-PIL = HERE.parent / "pil"
+#: What there is below a program on a bare Cortex-M7.
+BARE_METAL = ROOT / "fcsl_compiler" / "bare_metal"
+BOARD = ROOT / "fcsl_hal" / "firmware" / "mps2-an500"
 MATH = ROOT / "fcsl_compiler" / "math"
 #: The project's own flags but for the level of optimisation.
 BASE = tuple(f for f in FLAGS if not f.startswith("-O"))
@@ -64,8 +66,8 @@ def by_nim(target: Target) -> Target:
 def _cortex_m7(flags: tuple[str, ...] = ("-O3",)) -> Target:
     # Enums and 128-bit integers as CORE-MATH needs them; no position-independent code on a bare processor.
     line = "clang-19 --target=thumbv7em-none-eabihf -mcpu=cortex-m7 -fforce-enable-int128 -fshort-enums -fno-pic"
-    compiler = (*line.split(), f"-I{PIL / 'include'}")
-    link = ("-nostdlib", "-fuse-ld=lld-19", f"-Wl,-T,{PIL / 'an500.ld'}")
+    compiler = (*line.split(), f"-I{BARE_METAL / 'include'}")
+    link = ("-nostdlib", "-fuse-ld=lld-19", f"-Wl,-T,{BOARD / 'memory.ld'}")
     runner = tuple("qemu-system-arm -M mps2-an500 -display none -monitor none -serial none".split())
     return Target(f"Cortex-M7 {' '.join(flags)}", compiler, flags, True, link, runner, bare=True)
 
@@ -139,9 +141,9 @@ def math_objects(target: Target) -> list[Path]:
 def build(target: Target, sources: Sources, folder: Path, platform: Sequence[Path] = ()) -> Path:
     """The program of bits.c, or the one that `platform` holds besides start-up code. Raises CheckFailed."""
     folder.mkdir(parents=True, exist_ok=True)
-    below = [PIL / "start.c", PIL / "runtime.c"] if target.bare else [HERE / "hosted.c"]
+    below = [BOARD / "start.c", BARE_METAL / "runtime.c"] if target.bare else [HERE / "hosted.c"]
     harness = [*(platform or [HERE / "bits.c", SHARED / "stimulus.c"]), *below]
-    includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), HERE, SHARED)]
+    includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), HERE, SHARED, BOARD.parent)]
     # The flags under test compile the machines alone: what measures stays what it is.
     parts = [(target.flags, sources.machines), (("-O2",), tuple(harness))]
     objects: list[Path] = []

@@ -2,8 +2,8 @@
  *
  * Of the C standard's <math.h>, what generated code and CORE-MATH use; see ../runtime.c.
  */
-#ifndef FCSL_PIL_MATH_H
-#define FCSL_PIL_MATH_H
+#ifndef FCSL_BARE_METAL_MATH_H
+#define FCSL_BARE_METAL_MATH_H
 
 #define NAN         __builtin_nanf("")
 #define INFINITY    __builtin_inff()

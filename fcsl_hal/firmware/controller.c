@@ -1,53 +1,35 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A flight computer on a bare Cortex-M7: one compiled machine, its channels on a serial line. To a simulator it is what any
- * other controller on a wire is (docs/reference/transports.md): it says hello, then answers each time message with an actuator message.
+ * Processor in the loop: a flight computer without an operating system, with one compiled machine, its channels on a serial line. To a
+ * simulator it is what any other controller on a wire is (docs/reference/transports.md): it says hello, then answers each time
+ * message with an actuator message. So the simulator decides when a tick is, and no timer does.
  *
- * The serial line carries COBS frames of the link layer (docs/reference/transports.md): messages travel on port 0, reliable. When the run ends,
- * the hash over all fields of every tick is printed (../shared/stimulus.h), to be compared with that of the same machine in
- * another process.
+ * The line carries COBS frames of the link layer; messages travel on port 0, reliable. When the run ends, the checksum
+ * over all fields of every tick is printed, to be compared with that of the same machine in another process.
  */
 #include <string.h>
 
-#include "bits.h"
+#include "pil_board.h"
 #include "fcsl/fcsl_cobs.h"
 #include "fcsl/fcsl_gate.h"
+#include "fcsl/fcsl_link.h"
 #include "fcsl/fcsl_scalar.h"
-#include "stimulus.h"
 
-enum { MACHINE_BYTES = 1 << 20, MESSAGE_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
+/* Bytes of the machine's struct, as `fcsl build --processor` prints it, and of its longest message of channels. */
+#ifndef FCSL_MACHINE_BYTES
+#error "define FCSL_MACHINE_BYTES: the bytes of state that fcsl build --processor prints"
+#endif
+#ifndef FCSL_MESSAGE_BYTES
+#define FCSL_MESSAGE_BYTES 4096
+#endif
+
+enum { HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
 enum { PORT = 0, SESSION = 1, RETRANSMIT_TICKS = 50 };
 
-/* The first serial port of the board (ARM's CMSDK UART), whose receiver is interrupt 0. */
-static volatile uint32_t *const UART = (volatile uint32_t *)0x40004000u;
-enum { DATA = 0, STATE = 1, CONTROL = 2, PENDING = 3, DIVIDER = 4 };
-enum { SEND_FULL = 1, RECEIVED = 2, ENABLE_WITH_INTERRUPT = 1 | 2 | 8, LEAST_DIVIDER = 16 };
-static volatile uint32_t *const INTERRUPT_ENABLE = (volatile uint32_t *)0xe000e100u;
-static volatile uint32_t *const INTERRUPT_CLEAR = (volatile uint32_t *)0xe000e280u;
-/* The timer of the processor: a link tick a millisecond. */
-static volatile uint32_t *const TIMER = (volatile uint32_t *)0xe000e010u;
-static volatile uint32_t *const INTERRUPT_STATE = (volatile uint32_t *)0xe000ed04u;
-enum {
-    TIMER_CONTROL = 0,
-    TIMER_RELOAD = 1,
-    TIMER_VALUE = 2,
-    TIMER_ON = 7,
-    TIMER_PASSED = 1 << 16,
-    TIMER_CLEAR = 1 << 25
-};
-enum { CLOCK_HZ = 25000000, LINK_HZ = 1000 };
-
-static _Alignas(16) uint8_t machine[MACHINE_BYTES];
-static uint8_t bytes[MESSAGE_MAX];
+static _Alignas(16) uint8_t machine[FCSL_MACHINE_BYTES];
+static uint8_t bytes[FCSL_MESSAGE_BYTES];
 static fcsl_link_t serial;
 static fcsl_cobs_decoder_t decoder;
-
-static void send_byte(uint8_t byte)
-{
-    while ((UART[STATE] & SEND_FULL) != 0u) {
-    }
-    UART[DATA] = byte;
-}
 
 /* A link tick: what is due leaves. */
 static void tick_link(void)
@@ -58,36 +40,32 @@ static void tick_link(void)
     for (size_t size = fcsl_link_next_frame(&serial, frame); size > 0; size = fcsl_link_next_frame(&serial, frame)) {
         const size_t count = fcsl_cobs_encode(frame, size, encoded);
         for (size_t i = 0; i < count; i++) {
-            send_byte(encoded[i]);
+            board_send(encoded[i]);
         }
     }
 }
 
-static void take_byte(void)
+static void take_byte(uint8_t byte)
 {
-    UART[PENDING] = RECEIVED; /* before the byte is taken, and so before the next one can come */
-    *INTERRUPT_CLEAR = 1u;
-    const uint8_t byte = (uint8_t)UART[DATA];
     size_t size = 0;
-    (void)fcsl_cobs_decode(&decoder, &byte, sizeof byte, &size);
+    (void)fcsl_cobs_decode(&decoder, &byte, sizeof byte, &size); /* what is no frame has size 0 */
     if (size > 0) {
         fcsl_link_take_frame(&serial, decoder.frame, size);
     }
 }
 
-/* The next message of the simulator, in `bytes`. Sleeps until a byte has come or the timer has passed: a pending interrupt ends
- * the sleep and, being masked, does nothing else. */
+/* The next message of the simulator, in `bytes`: it waits for it without an end, as nothing flies. */
 static size_t receive_message(void)
 {
     size_t size = 0;
     while (fcsl_link_receive(&serial, PORT, bytes, sizeof bytes, &size) != FCSL_LINK_OK) {
-        if ((UART[STATE] & RECEIVED) != 0u) {
-            take_byte();
-        } else if ((TIMER[TIMER_CONTROL] & TIMER_PASSED) != 0u) {
-            *INTERRUPT_STATE = TIMER_CLEAR;
+        uint8_t byte = 0;
+        if (board_receive(&byte)) {
+            take_byte(byte);
+        } else if (board_tick()) {
             tick_link();
         } else {
-            __asm__ volatile("wfi");
+            board_wait();
         }
     }
     return size;
@@ -117,13 +95,46 @@ static int shake_hands(const fcsl_channel_table_t *table)
     return receive_message() == sizeof own && memcmp(bytes, own, sizeof own) == 0 ? 0 : -1;
 }
 
-static void print_hash(uint64_t hash)
+/* Sensor channels have their age and validity from now on. */
+static void attach_channels(const fcsl_machine_t *d)
 {
-    char text[] = "fields ................\n";
-    for (int i = 0; i < 16; i++) {
-        text[7 + i] = "0123456789abcdef"[(hash >> (60 - 4 * i)) & 15u];
+    for (uint32_t i = 0; i < d->channel_count; i++) {
+        if (d->channels[i].direction == FCSL_SENSOR) {
+            machine[d->channels[i].attached_offset] = 1;
+        }
     }
-    platform_print(text);
+}
+
+/* Of all fields, in the order of the table. Every NaN counts as the same one: its other bits are the processor's. */
+static uint32_t checksum(const fcsl_machine_t *d, uint32_t crc)
+{
+    static const uint8_t nan64[8] = {0, 0, 0, 0, 0, 0, 0xf8, 0x7f};
+    static const uint8_t nan32[4] = {0, 0, 0xc0, 0x7f};
+    for (uint32_t i = 0; i < d->field_count; i++) {
+        const fcsl_field_t *field = &d->fields[i];
+        const uint32_t size = field->size / field->count;
+        for (uint32_t k = 0; k < field->count; k++) {
+            const uint8_t *at = machine + field->offset + k * size;
+            double wide = 0.0;
+            float narrow = 0.0f;
+            if (field->type == FCSL_F64) {
+                memcpy(&wide, at, sizeof wide);
+            } else if (field->type == FCSL_F32) {
+                memcpy(&narrow, at, sizeof narrow);
+            }
+            crc = fcsl_crc32(crc, wide != wide ? nan64 : narrow != narrow ? nan32 : at, size);
+        }
+    }
+    return crc;
+}
+
+static void print_checksum(uint32_t crc)
+{
+    char text[] = "fields ........\n";
+    for (int i = 0; i < 8; i++) {
+        text[7 + i] = "0123456789abcdef"[(crc >> (28 - 4 * i)) & 15u];
+    }
+    board_print(text);
 }
 
 /* Takes the sensors of a tick, if some come, and its time. 1 for the tick, 0 at the end of the run, -1 for anything else. */
@@ -151,13 +162,13 @@ static int fly(const fcsl_channel_table_t *table)
 {
     const fcsl_machine_t *d = table->machine;
     const fcsl_host_t host = {0};
-    uint64_t hash = 0;
+    uint32_t crc = 0;
     uint64_t tick = 0;
     int goes_on = receive_tick(table, tick);
     for (; goes_on > 0; goes_on = receive_tick(table, tick)) {
         fcsl_message_t message;
         d->step(machine, &host);
-        hash = stimulus_hash(d, machine, hash);
+        crc = checksum(d, crc);
         const int armed = fcsl_is_armed(d, machine);
         if (fcsl_message_encode_actuators(table, machine, tick, armed, bytes, sizeof bytes, &message) != 0) {
             return 9; /* main has seen that there is room */
@@ -166,11 +177,11 @@ static int fly(const fcsl_channel_table_t *table)
         tick++;
     }
     if (goes_on < 0) {
-        platform_print("a message that is none, or of another tick\n");
+        board_print("a message that is none, or of another tick\n");
         return 10;
     }
     tick_link(); /* the last acknowledgement */
-    print_hash(hash);
+    print_checksum(crc);
     return 0;
 }
 
@@ -180,25 +191,20 @@ int main(int argc, char **argv)
     (void)argv;
     const fcsl_machine_t *d = fcsl_machines[0];
     const fcsl_link_policy_t policies[FCSL_LINK_PORTS] = {[PORT] = FCSL_LINK_RELIABLE};
-    UART[DIVIDER] = LEAST_DIVIDER;
-    UART[CONTROL] = ENABLE_WITH_INTERRUPT;
-    TIMER[TIMER_RELOAD] = CLOCK_HZ / LINK_HZ - 1;
-    TIMER[TIMER_VALUE] = 0;
-    TIMER[TIMER_CONTROL] = TIMER_ON;
-    __asm__ volatile("cpsid i");
-    *INTERRUPT_ENABLE = 1u;
+    board_open();
     if (d->size > sizeof machine || fcsl_message_capacity(d, FCSL_SENSOR_MESSAGE) > sizeof bytes ||
         fcsl_message_capacity(d, FCSL_ACTUATOR_MESSAGE) > sizeof bytes ||
         fcsl_link_open(&serial, policies, SESSION, RETRANSMIT_TICKS) != 0) {
-        platform_print("no room for this machine or its messages\n");
+        board_print("no room for this machine or its messages\n");
         return 1;
     }
-    send_byte(0); /* a stream of frames begins with a zero */
+    board_send(0); /* a stream of frames begins with a zero */
     const fcsl_channel_table_t table = fcsl_channel_table(d);
-    if (d->init(machine) != 0 || shake_hands(&table) != 0) {
-        platform_print("the machine does not begin, or the simulator flies another one\n");
+    d->init(machine);
+    if (d->start(machine) != 0 || shake_hands(&table) != 0) {
+        board_print("the machine does not start, or the simulator flies another one\n");
         return 1;
     }
-    stimulus_begin(d, machine); /* attaches the sensor channels */
+    attach_channels(d);
     return fly(&table);
 }

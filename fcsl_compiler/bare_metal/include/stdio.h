@@ -2,8 +2,8 @@
  *
  * Of the C standard's <stdio.h>, what generated code and CORE-MATH use (nothing: it prints nowhere); see ../runtime.c.
  */
-#ifndef FCSL_PIL_STDIO_H
-#define FCSL_PIL_STDIO_H
+#ifndef FCSL_BARE_METAL_STDIO_H
+#define FCSL_BARE_METAL_STDIO_H
 
 #include <stddef.h>
 

@@ -2,8 +2,8 @@
  *
  * Of the C standard's <errno.h>, what generated code and CORE-MATH use (no errno is kept); see ../runtime.c.
  */
-#ifndef FCSL_PIL_ERRNO_H
-#define FCSL_PIL_ERRNO_H
+#ifndef FCSL_BARE_METAL_ERRNO_H
+#define FCSL_BARE_METAL_ERRNO_H
 
 #define EDOM   33
 #define ERANGE 34

@@ -2,8 +2,8 @@
  *
  * Of the C standard's <inttypes.h>, what generated code and CORE-MATH use; see ../runtime.c.
  */
-#ifndef FCSL_PIL_INTTYPES_H
-#define FCSL_PIL_INTTYPES_H
+#ifndef FCSL_BARE_METAL_INTTYPES_H
+#define FCSL_BARE_METAL_INTTYPES_H
 
 #include <stdint.h>
 

@@ -2,8 +2,8 @@
  *
  * Of the C standard's <fenv.h>, what generated code and CORE-MATH use; see ../runtime.c.
  */
-#ifndef FCSL_PIL_FENV_H
-#define FCSL_PIL_FENV_H
+#ifndef FCSL_BARE_METAL_FENV_H
+#define FCSL_BARE_METAL_FENV_H
 
 #define FE_TONEAREST  0
 #define FE_UPWARD     1

@@ -2,8 +2,8 @@
  *
  * Of the C standard's <string.h>, what generated code and CORE-MATH use; see ../runtime.c.
  */
-#ifndef FCSL_PIL_STRING_H
-#define FCSL_PIL_STRING_H
+#ifndef FCSL_BARE_METAL_STRING_H
+#define FCSL_BARE_METAL_STRING_H
 
 #include <stddef.h>
 

@@ -5,7 +5,7 @@
  */
 #include <stdint.h>
 
-#include "../bits/bits.h"
+#include "pil_board.h"
 
 extern uint32_t data_in_rom[], data_begin[], data_end[], bss_begin[], bss_end[], stack_top[];
 
@@ -19,7 +19,7 @@ static int semihosting(int operation, const void *argument)
     return r0;
 }
 
-void platform_print(const char *text)
+void board_print(const char *text)
 {
     (void)semihosting(WRITE_TEXT, text);
 }
@@ -55,7 +55,7 @@ static int arguments(char **words)
 
 static void fault(void)
 {
-    platform_print("the processor faulted\n");
+    board_print("the processor faulted\n");
     leave(99);
 }
 
