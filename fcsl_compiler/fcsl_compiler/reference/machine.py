@@ -445,6 +445,10 @@ class ReferenceMachine:
             instance.init(image)
         for sensor in self._sensors.values():
             image.bytes[sensor.valid] = image.bytes[sensor.waiting] = 1
+
+    def start(self, memory: Memory) -> int:
+        """Runs every start in JSON order. Returns 0, or 1 + the index of the instance that faulted."""
+        image = self._image_of(memory)
         for index, instance in enumerate(self._instances):
             if not instance.start(image):
                 return index + 1
@@ -474,10 +478,6 @@ class ReferenceMachine:
             words[self._current] = _NONE
         self._apply_effects(words)
         self._arbitrate(image, state, due)
-
-    def start(self, memory: Memory) -> int:
-        """Runs every start in JSON order. Returns 0, or 1 + the index of the instance that faulted."""
-        image = self._image_of(memory)
         if self._ticks_in_state is not None:
             image.longs[self._ticks_in_state] = image.longs[self._ticks_in_state] + 1 & _LONG
         image.longs[self._tick] = tick + 1 & _LONG

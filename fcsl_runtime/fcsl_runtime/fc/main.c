@@ -330,14 +330,14 @@ static void announce(const program_t *program)
     if (options_hal_is_composite(&program->options)) {
         log_info("sensors of the board %s instead of the simulator's", program->options.composite_plan);
     }
+    if (program->options.parameters != NULL) {
+        log_info("parameters of %s", program->options.parameters);
+    }
     if (program->options.restore != NULL) {
         log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }
     if (program->options.board != NULL) {
         log_info("board %s", program->options.board);
-    }
-    if (program->options.parameters != NULL) {
-        log_info("parameters of %s", program->options.parameters);
     }
     if (program->options.guard != NULL) {
         log_info("actuators by the guard at %s", program->options.guard);

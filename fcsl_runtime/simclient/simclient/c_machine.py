@@ -164,6 +164,7 @@ class CMachine(Structure):
         ("views", c_char_p),
         ("stack_bytes", c_uint32),
         ("init", c_void_p),
+        ("start", c_void_p),
         ("step", c_void_p),
         ("force_state", c_void_p),
     ]
@@ -195,7 +196,6 @@ class CMonitor(Structure):
         ("watched", c_char_p),
         ("machine", POINTER(CMachine)),
         ("observed", POINTER(CObserved)),
-        ("start", c_void_p),
         ("observed_count", c_uint32),
         ("requirements", POINTER(CRequirement)),
         ("requirement_count", c_uint32),

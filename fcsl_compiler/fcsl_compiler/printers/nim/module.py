@@ -194,6 +194,7 @@ proc initMachine*(m: var {machine}): int32 =
   ## Zeroes the machine, binds parameters, runs start of every instance. Returns 0, or 1 + the index of the instance whose
   ## start faulted.
   {init}(addr m)
+  {start}(addr m)
 
 proc step*(m: var {machine}, host: var Host) =
   ## Runs one tick.
@@ -204,4 +205,3 @@ proc forceState*(m: var {machine}, state: {module.state_type}) =
   {force}(addr m, int32(ord(state)))
 """)
     w.line()
-  {start}(addr m)
