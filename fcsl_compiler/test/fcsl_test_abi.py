@@ -218,7 +218,6 @@ class Machine:
         self.states = [self.d.states[i].name.decode() for i in range(self.d.state_count)]
         self.channels = {self.d.channels[i].name.decode(): self.d.channels[i] for i in range(self.d.channel_count)}
         self.init_result = self.initialise() if init else None
-        self._events = Events()
         self._host = Host(events=c.pointer(self._events))
 
     def initialise(self) -> int:

@@ -141,7 +141,7 @@ static int initialise(fcsl_run_t *run, const fcsl_parameters_t *parameters, fcsl
     const int32_t faulted = refused ? 0 : machine->start(run->data);
     fcsl_fp_leave(callers);
     if (faulted == 0) {
-        return 0;
+        return refused ? -1 : 0;
     }
     if (faulted < 0 || (uint32_t)faulted > machine->instance_count) {
         return fcsl_fail(error, "machine '%s' cannot be initialised", machine->name);
