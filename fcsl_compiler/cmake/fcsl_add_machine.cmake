@@ -4,14 +4,14 @@
 get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
 
-# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TARGET <name>] [BACKEND c|nim])
+# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TIMES] [TARGET <name>] [BACKEND c|nim])
 #   Compiles machines into the shared library <target>. The name of a machine in it is its file stem. Installs the library to
 #   lib/<package> and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's
 #   --strict. TARGET selects one of the machines' `targets`, which defines the link inputs of externs (default: simulation).
 #   A library of another target is not registered: to run it, name its file. BACKEND is the language that fcslc writes
-#   (default: c); the library is the same.
+#   (default: c); the library is the same. TIMES is fcslc's --times: hosts measure each instance.
 function(fcsl_add_machine target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "TARGET;BACKEND" "")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT;TIMES" "TARGET;BACKEND" "")
   if(NOT arg_TARGET)
     set(arg_TARGET simulation)
   endif()
@@ -21,6 +21,9 @@ function(fcsl_add_machine target)
   set(options --target "${arg_TARGET}" --backend "${arg_BACKEND}")
   if(arg_STRICT)
     list(APPEND options --strict)
+  endif()
+  if(arg_TIMES)
+    list(APPEND options --times)
   endif()
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/${target}_c")
   set(configs "")

@@ -33,10 +33,10 @@ def run(options: argparse.Namespace) -> int:
     if options.dump:
         until, dump = DUMPS[options.dump]
         for path in options.config:
-            print(
-                dump(compile_machine(path, toolchain(), until=until, strict=options.strict, backend=options.backend)),
-                end="",
+            compiled = compile_machine(
+                path, toolchain(), until, options.strict, backend=options.backend, times=options.times
             )
+            print(dump(compiled), end="")
         return 0
     first: Path = options.config[0]
     if options.instances is not None and len(options.config) > 1:
@@ -57,7 +57,9 @@ def run(options: argparse.Namespace) -> int:
     costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
-        compilations = emit(options.config, folder, options.strict, options.target, instances, options.backend)
+        compilations = emit(
+            options.config, folder, options.strict, options.target, instances, options.backend, options.times
+        )
     else:
         inspect = _collect_facts(costs) if options.report else lambda *_: None
         with progress(f"fcslc: compiling {library.name} ..."):
@@ -69,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
                 inspect=inspect,
                 instances=instances,
                 backend=options.backend,
+                times=options.times,
             )
     record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
     write_record(record, compilations, "" if options.c_only else _command(options, folder))
@@ -99,6 +102,7 @@ def _command(options: argparse.Namespace, folder: Path) -> str:
         words += [] if value is None else [f"--{name}", value]
     words += ["--backend", options.backend] if options.backend != DEFAULT_BACKEND else []
     words += ["--target", options.target] if options.target != DEFAULT_TARGET else []
+    words += ["--times"] if options.times else []
     return shlex.join([*words, *(["--strict"] if options.strict else [])])
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..base.files import MAX_SOURCE_BYTES, SourceError, digest, read_regular
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
-from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
+from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET, TIMES
 from ..parse.machine_texts import MachineTexts, package_of, read_texts
 from .backends import toolchain_of_backend
 from .cache_entry import cached
@@ -55,7 +55,8 @@ def build_machine(
     unchanged.
 
     `instances`: instances of a subset machine. `requirements`: a file of those that take the place of the machine's own. If
-    COVER_DIR is set, the result is a build for coverage, by the C backend. Raises DiagnosticError (str() is the rendered text) and ToolchainError.
+    COVER_DIR is set, the result is a build for coverage, by the C backend; else, if TIMES is, the host measures each instance.
+    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
         return _build_machine(config, target, instances, backend, requirements)
@@ -67,11 +68,12 @@ def _build_machine(
     config: Path, target: str, instances: Sequence[str] | None, backend: str, requirements: Path | None
 ) -> BuiltMachine:
     cover = bool(os.environ.get(COVER_DIR))
+    times = bool(os.environ.get(TIMES)) and not cover
     if cover:
         backend = DEFAULT_BACKEND
 
     def key() -> str:
-        found = _cache_key(config, target, cover, instances, backend, requirements)
+        found = _cache_key(config, target, cover, times, instances, backend, requirements)
         if found is None:
             from .passes import compile_machine
 
@@ -84,7 +86,15 @@ def _build_machine(
         from .library import build_library
 
         (built,) = build_library(
-            [config], library, False, target, cover, instances=instances, backend=backend, requirements=requirements
+            [config],
+            library,
+            False,
+            target,
+            cover,
+            instances=instances,
+            backend=backend,
+            requirements=requirements,
+            times=times,
         )
         machine = built.checked
         return {"name": machine.name, "source_hash": source_hash(machine)}
@@ -97,6 +107,7 @@ def _cache_key(
     config: Path,
     target: str,
     cover: bool,
+    times: bool,
     instances: Sequence[str] | None,
     backend: str,
     requirements: Path | None,
@@ -110,6 +121,7 @@ def _cache_key(
     # A build for coverage contains the full paths of its files, one with a mesh that of the mesh.
     name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if texts.has_mesh else config.name
     parts = [name, package_of(config, config.stem), texts.text, _identity(), toolchain_of_backend(backend), *externs]
+    parts += [TIMES] if times else []
     for file in texts.files.items():
         parts += file
     if requirements is not None:

@@ -29,15 +29,16 @@ def emit(
     target: str = DEFAULT_TARGET,
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    times: bool = False,
 ) -> list[Compilation]:
     """Writes <stem>.c, .h and .map.json of every machine and monitor, the algorithms of requirements that act, and
     fcsl_machines.c, into `folder`. With backend "nim" the C
     is <stem>.nim.c, which Nim makes of <stem>.nim.
 
-    `instances`: instances of a subset machine. Writes nothing if a machine does not compile. Raises DiagnosticError,
-    ToolchainError.
+    `instances`: instances of a subset machine. `times`: the host measures each instance. Writes nothing if a machine does
+    not compile. Raises DiagnosticError, ToolchainError.
     """
-    compilations = compile_all(configs, strict, target, instances=instances, backend=backend)
+    compilations = compile_all(configs, strict, target, instances=instances, backend=backend, times=times)
     for c in compilations:
         with explained(sorted(e.name for e in c.checked.externs), [c.target]):
             check_externs(c.target.sources, c.checked.externs)  # whoever compiles the C does not compare their types
@@ -53,12 +54,13 @@ def compile_all(
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
     requirements: Path | None = None,
+    times: bool = False,
 ) -> list[Compilation]:
     """Compiles machines to source in memory and checks that they can share a library. Raises DiagnosticError,
     ToolchainError."""
     found = toolchain_of_backend(backend)
     compilations = [
-        compile_machine(path, found, "emit", strict, target, cover, instances, backend, requirements)
+        compile_machine(path, found, "emit", strict, target, cover, instances, backend, requirements, times)
         for path in configs
     ]
     for c in compilations:
@@ -124,17 +126,19 @@ def build_library(
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
     requirements: Path | None = None,
+    times: bool = False,
 ) -> list[Compilation]:
     """Compiles machines to one shared library and writes the C files beside it. Raises DiagnosticError, ToolchainError.
 
     `cover`: adds execution counters for `fcsl cover` (fcsl_cover.h). `instances`: instances of a subset machine.
-    `requirements`: a file of those that take the place of the machines' own.
+    `requirements`: a file of those that take the place of the machines' own. `times`: the host measures each instance
+    (fcsl_host_t.measure).
 
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
     start_call_graph_query()
-    compilations = compile_all(configs, strict, target, cover, instances, backend, requirements)
+    compilations = compile_all(configs, strict, target, cover, instances, backend, requirements, times)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     output.parent.mkdir(parents=True, exist_ok=True)

@@ -23,7 +23,7 @@ from ..emit.fault_places import FaultPlaces
 from ..emit.field_table import source_hash
 from ..emit.machine import emit_machine
 from ..lower.lower import lower
-from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
+from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET, TIMES
 from ..model.machine import Machine
 from ..model.target import Target
 from ..parse.machine_files import ParsedMachine, parse_machine
@@ -31,6 +31,7 @@ from ..parse.targets import choose_target
 from ..printers.c.descriptor import DescriptorEmitter
 from ..printers.c.header import print_header
 from ..printers.c.source import print_source
+from ..printers.c.writer import CWriter
 from ..printers.nim.module import print_module
 from ..printers.source_map import source_map
 from ..printers.writer import Writer
@@ -63,6 +64,7 @@ class Compilation:
     build_hash: str = ""
     stack_bound: int | None = None  # stack of step in bytes, after compiling; None if unknown
     cover: bool = False  # True for a coverage build, which must not fly
+    times: bool = False  # True for a build of which the host measures each instance
     backend: str = DEFAULT_BACKEND  # language of the source (BACKENDS)
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
     requirements_file: Path | None = None  # instead of the machine's own requirements
@@ -153,17 +155,20 @@ def _emit(c: Compilation) -> None:
         lowered = lower(covered.machine)
     c.c_inputs = extern_inputs(c.parsed, c.target)
     linked = (*c.target.digest_parts, *c.c_inputs.digest_parts)
-    c.build_hash = digest(source_hash(m), c.toolchain, *linked, *([BUILD_NOTE] if covered else []))
+    notes = (*([BUILD_NOTE] if covered else []), *([TIMES] if c.times else []))
+    c.build_hash = digest(source_hash(m), c.toolchain, *linked, *notes)
     places = FaultPlaces(lowered)
-    program = emit_machine(lowered, places)
+    program = emit_machine(lowered, places, c.times)
+
+    def describe(to: CWriter) -> None:
+        DescriptorEmitter(m, to, c.build_hash, places, program.stack_bytes, c.times).emit()
+
     w: Writer
     if c.backend == "nim":
-        w = print_module(
-            program, lambda inner: DescriptorEmitter(m, inner, c.build_hash, places, program.stack_bytes).emit()
-        )
+        w = print_module(program, describe)
     else:
         w = print_source(program, prelude(covered.map) if covered is not None else "", C_OPERATIONS)
-        DescriptorEmitter(m, w, c.build_hash, places, program.stack_bytes).emit()
+        describe(w)
     c.header, c.source, c.map = print_header(program), w.text(), source_map(program, w, c.source_name)
 
 
@@ -201,13 +206,15 @@ def compile_machine(
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
     requirements: Path | None = None,
+    times: bool = False,
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
     `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a
-    subset machine. `requirements`: a file of those that take the place of the machine's own.
+    subset machine. `requirements`: a file of those that take the place of the machine's own. `times`: the host measures
+    each instance.
     """
-    c = Compilation(path, toolchain, strict, target, instances, cover=cover, backend=backend)
+    c = Compilation(path, toolchain, strict, target, instances, cover=cover, times=times, backend=backend)
     c.requirements_file = requirements
     for step in PASSES:
         step.run(c)

@@ -25,11 +25,11 @@ from .step import StepEmitter
 from .straight_line import written_out
 
 
-def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
-    """`machine`: lowered. `places`: of its faults."""
+def emit_machine(machine: Machine, places: FaultPlaces, times: bool = False) -> code.Program:
+    """`machine`: lowered. `places`: of its faults. `times`: the host measures each instance."""
     quiet = quiet_instances(machine)
     firsts = first_identical(machine, quiet)
-    functions = tuple(_functions(machine, places, quiet, firsts))
+    functions = tuple(_functions(machine, places, quiet, firsts, times))
     used = set().union(*(code.used_names(f.body) for f in functions))
     described, private = tuple(records(machine, firsts)), tuple(result_records(machine))
     return code.Program(
@@ -48,7 +48,7 @@ def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
 
 
 def _functions(
-    machine: Machine, places: FaultPlaces, quiet: frozenset[int], firsts: Sequence[int]
+    machine: Machine, places: FaultPlaces, quiet: frozenset[int], firsts: Sequence[int], times: bool
 ) -> Iterator[code.Function]:
     inlined = inlined_functions(machine)
     bodies: dict[str, code.Function] = {}
@@ -62,7 +62,7 @@ def _functions(
     yield from ColdPathEmitter(machine, places, quiet).emit()
     for index, (instance, first) in enumerate(zip(machine.instances, firsts, strict=True)):
         yield from InstanceEmitter(machine, instance, index in quiet, machine.instances[first]).emit()
-    yield from StepEmitter(machine, quiet, firsts).emit()
+    yield from StepEmitter(machine, quiet, firsts, times).emit()
 
 
 def _is_dense(machine: Machine, function: ir.Function) -> bool:

@@ -37,9 +37,9 @@ _GREATEST_AGE = Literal(0xFFFF_FFFF, U32)
 class StepEmitter:
     """Makes the functions of the descriptor, callees first."""
 
-    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
-        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py."""
-        self.m, self.quiet, self.firsts = machine, quiet, firsts
+    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int], times: bool):
+        """See TickEmitter."""
+        self.m, self.quiet, self.firsts, self.times = machine, quiet, firsts, times
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
     def emit(self) -> Iterator[Function]:
@@ -47,7 +47,7 @@ class StepEmitter:
         yield self._start()
         if len(self.m.states) > 1:
             yield self._enter()
-        yield from TickEmitter(self.m, self.quiet, self.firsts).emit()
+        yield from TickEmitter(self.m, self.quiet, self.firsts, self.times).emit()
         yield self._step()
         yield self._force_state()
 

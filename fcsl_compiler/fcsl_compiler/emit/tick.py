@@ -87,9 +87,10 @@ def _if_any(name: str, body: Sequence[Statement]) -> tuple[Statement, ...]:
 class TickEmitter:
     """Makes one function per state, and its callees."""
 
-    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
-        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py."""
-        self.m, self.quiet, self.firsts = machine, quiet, firsts
+    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int], times: bool):
+        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py. `times`: the host measures
+        each instance."""
+        self.m, self.quiet, self.firsts, self.times = machine, quiet, firsts, times
         self.flatten = takes_bodies_in(machine)
         self.noted = noted_instances(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
@@ -159,6 +160,8 @@ class TickEmitter:
         if timed:
             body.append(code.Var(_NOW.text, U64, Literal(0, U64), comment="the last reading of the clock"))
         body += self._delayed(state)
+        if self.times and state.entries:
+            body.append(self._measure(NO_INSTANCE))
         body += calls
         if not calls:
             body += self._entries(list(enumerate(state.entries)), readings)
@@ -304,7 +307,16 @@ class TickEmitter:
         if invalid:
             tests = [Binary("==", channel_place(c, "valid"), Literal(0, code.U8)) for c in invalid]
             body.append(If(one_of(tests), self._invalid(instance, invalid)))
+        if self.times:
+            body.append(self._measure(Literal(entry.instance, I32)))
         return body
+
+    @staticmethod
+    def _measure(instance: code.Expr) -> Statement:
+        """The host reads its clock: what passed since it last did is the time of this instance."""
+        measure = Member(Deref(_HOST), "measure")
+        called = Call(measure, (Member(Deref(_HOST), "ctx"), instance))
+        return If(Binary("!=", measure, code.Null()), (Do(called),))
 
     @staticmethod
     def _invalid(instance: Instance, channels: list[Channel]) -> tuple[Statement, ...]:

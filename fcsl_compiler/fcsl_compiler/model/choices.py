@@ -6,3 +6,5 @@ DEFAULT_TARGET = "simulation"
 #: Languages of generated source.
 BACKENDS = ("c", "nim")
 DEFAULT_BACKEND = "c"
+#: Environment variable: machines that tests and simulations compile are built as by `fcsl build --times`.
+TIMES = "FCSL_TIMES"

@@ -222,6 +222,9 @@ typedef struct {
     int32_t (*substitute)(void *ctx, uint32_t instance);
     /* Called after execute of such an instance, unless it was skipped; may be null. */
     void (*executed)(void *ctx, uint32_t instance);
+    /* Called by measured machines before the first instance of a tick, with FCSL_NONE, and after each one that was due, with its
+     * index: the time between two calls is that of the instance. May be null. It must not change the machine. */
+    void (*measure)(void *ctx, int32_t instance);
 } fcsl_host_t;
 
 typedef struct {
@@ -278,6 +281,7 @@ typedef struct {
     /* Enters `state` (an index into states) immediately and cancels a latched transition. Instances scheduled in both the old
      * and the new state continue, the others become stale. If `state` is already active, only its time restarts. */
     void (*force_state)(void *machine, int32_t state);
+    uint8_t measured; /* built with --times: a step calls `measure` of its host */
 } fcsl_machine_t;
 
 /* Exported by every machine library; ends with a null pointer. */

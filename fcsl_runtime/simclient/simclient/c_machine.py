@@ -167,6 +167,7 @@ class CMachine(Structure):
         ("start", c_void_p),
         ("step", c_void_p),
         ("force_state", c_void_p),
+        ("measured", c_uint8),
     ]
 
 

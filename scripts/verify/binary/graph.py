@@ -21,7 +21,7 @@ from .elf import Elf
 
 #: The functions of fcsl_host_t and struct fcsl_hw, as C calls them and as the C that Nim makes does.
 _HOST_CALL = re.compile(
-    r"(?:->|\(\*host\)\.)(clock_ns|substitute|executed|read_gpio|write_gpio|read_adc|read_u32|write_u32)\("
+    r"(?:->|\(\*host\)\.)(clock_ns|substitute|executed|measure|read_gpio|write_gpio|read_adc|read_u32|write_u32)\("
 )
 _INDIRECT = "__indirect_call"
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n\d+ bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')

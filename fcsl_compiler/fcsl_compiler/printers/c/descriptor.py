@@ -45,9 +45,11 @@ def _bound(number: int | float) -> str:
 class DescriptorEmitter:
     """Writes the constant tables and the fcsl_machine_t of a machine."""
 
-    def __init__(self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces, stack_bytes: int):
+    def __init__(
+        self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces, stack_bytes: int, times: bool
+    ):
         self.m, self.w, self.build_hash, self.places = machine, writer, build_hash, places
-        self.stack_bytes = stack_bytes
+        self.stack_bytes, self.times = stack_bytes, times
         self.rows = field_table(machine)
         self.by_path = {r.path: n for n, r in enumerate(self.rows)}
         self.struct = f"{machine.name}_t"
@@ -221,6 +223,8 @@ class DescriptorEmitter:
             rows |= {"ros_messages": table, "ros_message_count": f"{count}u"}
         if self.payloads != "NULL":
             rows["payloads"] = self.payloads
+        if self.times:
+            rows["measured"] = "1"
         if m.command_timeout_ns:
             rows["command_timeout_ns"] = f"UINT64_C({m.command_timeout_ns})"
         if self.after_ticks != "NULL":

@@ -40,6 +40,7 @@ type
     hw*: pointer
     substitute*: proc (ctx: pointer, instance: uint32): int32 {.cdecl, raises: [].}
     executed*: proc (ctx: pointer, instance: uint32) {.cdecl, raises: [].}
+    measure*: proc (ctx: pointer, instance: int32) {.cdecl, raises: [].}
 """
 
 #: Nim has no pointers to constants.

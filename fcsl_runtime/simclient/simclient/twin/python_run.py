@@ -46,6 +46,7 @@ class CHost(Structure):
         ("hw", POINTER(CHardware)),
         ("substitute", CFUNCTYPE(c_int32, ptr, c_uint32)),
         ("executed", CFUNCTYPE(None, ptr, c_uint32)),
+        ("measure", CFUNCTYPE(None, ptr, c_int32)),
     ]
 
 
@@ -180,6 +181,7 @@ class PythonMachine:
         }
         self.descriptor = CMachine.from_buffer_copy(compiled)
         self.descriptor.stack_bytes = 0  # Python keeps its arrays elsewhere
+        self.descriptor.measured = 0  # the times of CPython say nothing of the machine's
         for name, callback in self._callbacks.items():
             setattr(self.descriptor, name, ctypes.cast(callback, ptr).value)
 
