@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -196,6 +198,20 @@ DUMPS: dict[str, tuple[str, Callable[[Compilation], str]]] = {
 }
 
 
+@contextmanager
+def _without_garbage_collection() -> Iterator[None]:
+    """The passes make many values and few cycles of them: the collector would only walk them, again and again, in more than
+    linear time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@_without_garbage_collection()
 def compile_machine(
     path: Path,
     toolchain: str,

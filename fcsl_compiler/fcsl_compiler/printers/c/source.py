@@ -31,13 +31,22 @@ PRAGMAS = """\
 #endif
 """
 
+#: Functions of a program from which gcc does not specialise functions for their callers: the time that it takes to decide is
+#: quadratic in the number of calls. With 5000 instances that were 5 of 14 s.
+_MANY_FUNCTIONS = 1000
+NO_SPECIALISATION = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("no-ipa-cp") /* takes quadratic time for so many calls */
+#endif
+"""
+
 
 def print_source(program: code.Program, prelude: str, extensions: Mapping[str, Spelling]) -> CWriter:
     """The C file up to the descriptor. `prelude`: C before its functions. `extensions`: operations beside those of the
     language."""
     w = CWriter()
     w.block(f"/* {program.name}.c: made by fcslc from {program.source}. Do not edit. */")
-    w.block(PRAGMAS)
+    w.block(PRAGMAS + (NO_SPECIALISATION if len(program.functions) >= _MANY_FUNCTIONS else ""))
     w.block(f'#include "{program.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
     w.line()
     if program.uses_hardware:
