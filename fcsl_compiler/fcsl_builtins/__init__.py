@@ -28,7 +28,7 @@ _FUNCTIONS = (
     "interp_cell interp interp2 interp3 extrapolate extrapolate2 extrapolate3"
 ).split()
 
-__all__ = ["extern", "pi", "inf", "nan", *_TYPES, *_HARDWARE, *_FUNCTIONS]
+__all__ = ["event", "extern", "pi", "inf", "nan", *_TYPES, *_HARDWARE, *_FUNCTIONS]
 
 pi, inf, nan = math.pi, math.inf, math.nan
 
@@ -101,4 +101,5 @@ def _function(name: str) -> Callable[..., Any]:
 
 globals().update({name: _Type(name) for name in _TYPES})
 globals().update({name: _outside(name, "a hardware function") for name in _HARDWARE})
+event = _outside("event", "a report to the host")
 globals().update({name: _function(name) for name in _FUNCTIONS})

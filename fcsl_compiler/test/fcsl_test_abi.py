@@ -82,6 +82,28 @@ class FaultPlace(c.Structure):
     _fields_ = [("file", c.c_char_p), ("line", c.c_uint32), ("column", c.c_uint32), ("cause", c.c_char_p)]
 
 
+class EventSite(c.Structure):
+    _fields_ = [
+        ("instance", c.c_uint32),
+        ("file", c.c_char_p),
+        *[(n, c.c_uint32) for n in ("line", "column")],
+        ("text", c.c_char_p),
+        *[(n, c.c_uint8) for n in ("severity", "value_count")],
+        ("types", c.c_uint8 * 4),
+    ]
+
+
+class Event(c.Structure):
+    _fields_ = [("site", c.c_uint32), ("values", c.c_uint64 * 4)]
+
+
+class Events(c.Structure):
+    _fields_ = [
+        *[(n, c.c_uint32) for n in ("count", "lost", "first_site", "count_before", "lost_before")],
+        ("list", Event * 64),
+    ]
+
+
 class Host(c.Structure):
     _fields_ = [
         ("ctx", c.c_void_p),
@@ -89,6 +111,7 @@ class Host(c.Structure):
         ("hw", c.c_void_p),
         ("substitute", c.c_void_p),
         ("executed", c.c_void_p),
+        ("events", c.POINTER(Events)),
     ]
 
 
@@ -160,7 +183,18 @@ class Descriptor(c.Structure):
         ("start", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
         ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
         ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),
+        ("event_sites", c.POINTER(EventSite)),
+        ("event_site_count", c.c_uint32),
     ]
+
+
+def _values(site: EventSite, bits: list[int]) -> tuple[Any, ...]:
+    """NaNs as text, so that they compare."""
+    found: list[Any] = []
+    for type_, value in zip(site.types[: site.value_count], bits, strict=False):
+        held = _CTYPES[type_].from_buffer_copy(value.to_bytes(8, "little")).value
+        found.append(HEALTH[held] if TYPES[type_] == "health" else "nan" if held != held else held)
+    return tuple(found)
 
 
 def classes(text: str) -> list[str]:
@@ -218,6 +252,7 @@ class Machine:
         self.states = [self.d.states[i].name.decode() for i in range(self.d.state_count)]
         self.channels = {self.d.channels[i].name.decode(): self.d.channels[i] for i in range(self.d.channel_count)}
         self.init_result = self.initialise() if init else None
+        self._events = Events()
         self._host = Host(events=c.pointer(self._events))
 
     def initialise(self) -> int:
@@ -239,6 +274,7 @@ class Machine:
 
     def step(self, ticks: int = 1) -> None:
         for _ in range(ticks):
+            self._events.count = self._events.lost = 0
             self.d.step(self.base, c.byref(self._host))
 
     def force_state(self, name: str) -> None:
@@ -285,6 +321,26 @@ class Machine:
         """The last fault of an instance."""
         number = self.get(f"{instance}.counters.fault_place")
         return self.fault_places()[number - 1] if number else None
+
+    def event_sites(self) -> list[EventSite]:
+        return [self.d.event_sites[i] for i in range(self.d.event_site_count)]
+
+    def event_rows(self) -> list[tuple[int, str, int, int]]:
+        """Instance, file, line and column of each site, in the form that the reference takes."""
+        return [(s.instance, s.file.decode(), s.line, s.column) for s in self.event_sites()]
+
+    def events(self) -> tuple[int, list[tuple[int, list[int]]]]:
+        """Of the last tick: how many found no room, and site and values of the others."""
+        rows = self._events.list[: self._events.count]
+        return self._events.lost, [(row.site, list(row.values)) for row in rows]
+
+    def told(self) -> tuple[int, list[tuple[str, int, str, tuple[Any, ...]]]]:
+        """The same as values: instance, line, text, values."""
+        lost, rows = self.events()
+        names, sites = list(self.instances), self.event_sites()
+        return lost, [
+            (names[sites[n].instance], sites[n].line, sites[n].text.decode(), _values(sites[n], v)) for n, v in rows
+        ]
 
     def layout(self) -> dict[str, int]:
         """Offsets of all fields and of the bytes without a field, in the form that the reference takes."""

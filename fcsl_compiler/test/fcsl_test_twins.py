@@ -6,11 +6,11 @@ from __future__ import annotations
 import ctypes as c
 import math
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fcsl_test_abi import TYPES, Machine
+from fcsl_test_abi import HEALTH, TYPES, Machine
 
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
@@ -32,14 +32,23 @@ def bits(value: Any) -> Any:
     return value
 
 
+def event_bits(type_: str, value: Any) -> int:
+    """A value of an event as fcsl_event_t has it."""
+    if type_ == "f64":
+        return int.from_bytes(struct.pack("<d", value), "little")
+    if type_ == "f32":
+        return int.from_bytes(struct.pack("<f", value), "little")
+    return (HEALTH.index(value) if type_ == "health" else int(value)) & 2**64 - 1
+
+
 class InReference(Machine):
     """The tables of a compiled machine and an identical memory, in which CPython runs init, step and force_state."""
 
     def __init__(self, library: Path, checked: Checked, *, init: bool = True, externs: Externs | None = None):
         super().__init__(library, checked.name, init=False)
-        self.reference = ReferenceMachine(checked, self.layout(), self.fault_places(), externs)
+        self.reference = ReferenceMachine(checked, self.layout(), self.fault_places(), externs, self.event_rows())
         self.memory = memoryview((c.c_ubyte * self.d.size).from_address(self.base)).cast("B")
-        self._python_host = Host()
+        self._python_host = Host(event=self._tell)
         self.init_result = self.run_init() if init else None
 
     @classmethod
@@ -60,7 +69,18 @@ class InReference(Machine):
 
     def step(self, ticks: int = 1) -> None:
         for _ in range(ticks):
+            self._events.count = self._events.lost = 0
             self.reference.step(self.memory, self._python_host)
+
+    def _tell(self, site: int, values: Sequence[Any]) -> None:
+        if self._events.count == len(self._events.list):
+            self._events.lost += 1
+            return
+        row = self._events.list[self._events.count]
+        types = self.d.event_sites[site].types
+        packed = [event_bits(TYPES[type_], value) for type_, value in zip(types, values, strict=False)]
+        row.site, row.values[:] = site, [*packed, *[0] * (4 - len(packed))]
+        self._events.count += 1
 
     def force_state(self, name: str) -> None:
         self.reference.force_state(self.memory, self.states.index(name))
@@ -100,7 +120,8 @@ class Twins:
             assert {path: self.get(path) for path in expected} == expected, f"tick {tick}"
 
     def check(self, where: str = "") -> None:
-        """Asserts that every field is equal bit for bit."""
+        """Asserts that every field and all events are equal bit for bit."""
+        assert self.native.told() == self.python.told(), where
         if self.native.save() == self.python.save():
             return
         for path, f in self.native.fields.items():

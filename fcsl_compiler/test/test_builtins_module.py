@@ -19,6 +19,7 @@ from fcsl_compiler.check.library_files import library_names, overloads
 from fcsl_compiler.check.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
 from fcsl_compiler.model import ops
 from fcsl_compiler.model.effects import HARDWARE, HARDWARE_DOC
+from fcsl_compiler.model.events import EVENT, EVENT_DOC, SEVERITIES
 from fcsl_compiler.model.types import BOOL, HEALTH_NAMES, NUMBERS, SCALARS, Scalar, Type
 
 STUB = Path(__file__).parents[1] / "fcsl_builtins" / "__init__.pyi"
@@ -80,6 +81,13 @@ def hardware(name: str, doc: str) -> str:
     return function(name, arguments, python_type(HARDWARE[name].result), doc)
 
 
+def event() -> str:
+    severity = f'severity: Literal[{", ".join(map(json.dumps, SEVERITIES))}] = "info"'
+    return function(
+        EVENT, f"text: str, *values: bool | float | Health, {severity}", "None", EVENT_DOC.split(": ", 1)[1]
+    )
+
+
 def library_function(name: str) -> str:
     """One signature, or one for each number of arguments."""
     found = [library_signature(name, node) for node in overloads(name)]
@@ -117,6 +125,7 @@ def stub() -> str:
         text += function(name, argument, "_Array", doc.split(": ", 1)[1])
     text += "".join(builtin(name, doc) for name, doc in ops.BUILTINS.items() if name not in SCALARS)
     text += "".join(hardware(name, doc) for name, doc in HARDWARE_DOC.items())
+    text += event()
     return text + "".join(library_function(name) for name in library_names() if name not in ops.BUILTINS)
 
 
@@ -191,6 +200,7 @@ assert (cpu_temp.__name__, cpu_temp.__doc__) == ("cpu_temp", "Temperature in deg
 for call, error, text in [
     (lambda: cpu_temp(1), RuntimeError, "`cpu_temp` is an extern of cpu_temp.h"),
     (lambda: hw_read_adc(3), RuntimeError, "`hw_read_adc` is a hardware function"),
+    (lambda: event("late", severity="error"), RuntimeError, "`event` is a report to the host"),
     (lambda: f64[2, 3], TypeError, "write f64[2][3]"),
     (lambda: Health("failed"), TypeError, "Health converts nothing"),
 ]:
@@ -228,7 +238,7 @@ def test_algorithm_files_import(folder: Path, alone: Path) -> None:
 
 # ---- the stub, as a type checker reads it --------------------------------------------------------------------------
 
-ALGORITHM = """from fcsl_builtins import Health, TransitionRequest, clamp, dot, extern, f64, hw_read_adc, i32, inf, min, sqrt, zeros
+ALGORITHM = """from fcsl_builtins import Health, TransitionRequest, clamp, dot, event, extern, f64, hw_read_adc, i32, inf, min, sqrt, zeros
 
 @extern(header="cpu_temp.h")
 def cpu_temp() -> f64:
@@ -245,12 +255,19 @@ def work(x: float, n: int) -> None:
     y: f64 = clamp(sqrt(x), 0.0, inf)
     k: i32 = i32(y) + min(n, 1, 2) + hw_read_adc(3)
     y = dot(zeros(3), zeros(3)) + f64(k) + cpu_temp()
+    event("worked", y, k, health, severity="debug")
 """
 
 
 @pytest.mark.parametrize(
     ("more", "wrong"),
-    [("", ""), ('    health = "fine"\n', "fine"), ("    sqrt('a')\n", "sqrt"), ("    hw_read_pin(1)\n", "hw_read_pin")],
+    [
+        ("", ""),
+        ('    health = "fine"\n', "fine"),
+        ("    sqrt('a')\n", "sqrt"),
+        ("    hw_read_pin(1)\n", "hw_read_pin"),
+        ('    event("a", severity="warn")\n', "event"),
+    ],
 )
 def test_a_type_checker_reads_it(tmp_path: Path, more: str, wrong: str) -> None:
     (tmp_path / "alg.py").write_text(ALGORITHM + more)

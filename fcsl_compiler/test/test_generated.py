@@ -113,6 +113,7 @@ def test_generated_machines_use_the_language() -> None:
     words += [f"machine.{name}" for name in SOURCES]
     words += [f'.{name}"' for name in CHANNEL_SOURCES]
     words += [f" {name}(" for name in t.HARDWARE] + ["if hw_", "(hw_"]
+    words += ["event(", *(f'severity="{name}")' for name in ("debug", "info", "warning", "error"))]
     words += [f"{before}{t.EXTERN_CASE}_" for before in ("\n        ", " = ", "(", "def ")]
     assert [w for w in words if w not in text] == [] and re.search(r" [-+*/%&|^] hw_", text)
     files = [file for case in made for file in case.program.files]
@@ -131,6 +132,7 @@ def test_generated_machines_use_the_language() -> None:
     states = [[fields["machine.state"] for fields in trace] for trace in traces]
     moved = sum(trace[n] != trace[n - 1] for trace in states for n in range(1, len(trace)))
     assert len(traces) > 50 and faults > 10 and moved > 5
+    assert sum(len(fields["events"]) > 2 for trace in traces for fields in trace) > 50
 
 
 def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,10 @@ from ..driver.monitors import compile_monitor
 from ..driver.passes import compile_machine
 from ..reference.externs import externs_of
 from ..reference.fault_places import FaultRow
-from ..reference.machine import ReferenceMachine
+from ..reference.machine import EventRow, ReferenceMachine
 
 __all__ = [
+    "EventRow",
     "FaultRow",
     "ReferenceMachine",
     "build_externs",

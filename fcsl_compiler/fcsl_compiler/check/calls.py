@@ -11,6 +11,7 @@ from ..base.diagnostics import nearest
 from ..base.source import Span
 from ..model import ir, ops
 from ..model.effects import HARDWARE, can_fault
+from ..model.events import EVENT, EVENT_DOC, MOST_TEXT, MOST_VALUES, SEVERITIES, is_event_value, is_text
 from ..model.literals import fit
 from ..model.types import MAX_ELEMENTS, Array, Scalar, Struct
 from .algorithm_class import METHODS
@@ -30,6 +31,8 @@ class CallChecker(Checker):
         name = node.func.id
         if name in self.scope.wrong or name in self.scope.poisoned:
             raise Stop
+        if self.is_event(node):
+            self.fail("E421", "`event` returns nothing", span, help="call it in a separate statement: `event(…)`")
         outside = HARDWARE.get(name) or self.scope.functions.externs.get(name)
         if outside is not None:
             return self._outside(name, outside, node, span)
@@ -52,6 +55,48 @@ class CallChecker(Checker):
         known = self._functions()
         fix = instead_of_function(name, known)
         self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=fix)
+
+    def is_event(self, node: ast.Call) -> bool:
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        return name == EVENT and name not in self.scope.types and name not in self.scope.arguments
+
+    def event(self, node: ast.Call) -> ir.Event:
+        """Checks a statement `event(text, *values, severity="info")`."""
+        span = self.span(node)
+        self._in_execute(EVENT, span)
+        literal = node.args[0].value if node.args and isinstance(node.args[0], ast.Constant) else None
+        if not isinstance(literal, str) or not is_text(literal):
+            fix = f'write it as `event("gate passed", self.index)`, of 1 to {MOST_TEXT} printable characters of ASCII'
+            at = self.span(node.args[0]) if node.args else span
+            self.fail("E410", "the text of this event", at, why="it is compiled; values follow it", help=fix)
+        if len(node.args) > 1 + MOST_VALUES:
+            at = self.span(node.args[1 + MOST_VALUES])
+            self.fail("E416", f"an event has at most {MOST_VALUES} values", at, help=EVENT_DOC)
+        values = tuple(self._event_value(arg) for arg in node.args[1:])
+        return ir.Event(literal, self._severity(node), values, span)
+
+    def _event_value(self, node: ast.expr) -> ir.Expr:
+        value = self.not_a_string(self.raw(node))
+        if not is_event_value(value.type):
+            fix = "write its elements or members, such as `x[0]`" if not isinstance(value.type, Scalar) else ""
+            why = "an event has bools, numbers and healths"
+            self.fail("E402", f"a value of an event is {value.type}", value.span, why=why, help=fix)
+        return value
+
+    def _severity(self, node: ast.Call) -> int:
+        for keyword in node.keywords:
+            given = keyword.value.value if isinstance(keyword.value, ast.Constant) else None
+            if keyword.arg != "severity" or len(node.keywords) > 1:
+                self.fail("E416", f"`{EVENT}` has no such argument", self.span(keyword), help=EVENT_DOC)
+            if given not in SEVERITIES:
+                fix = (
+                    nearest(given, SEVERITIES) if isinstance(given, str) else ""
+                ) or f"one of {', '.join(SEVERITIES)}"
+                self.fail(
+                    "E410", "the severity of this event", self.span(keyword.value), why="it is compiled", help=fix
+                )
+            return SEVERITIES.index(str(given))
+        return SEVERITIES.index("info")
 
     def is_outside(self, node: ast.Call) -> bool:
         """Whether a call is one of an extern or a hardware builtin."""
@@ -76,11 +121,14 @@ class CallChecker(Checker):
             self.fail("E421", f"`{name}` returns nothing", span, help=f"call it in a separate statement: `{name}(…)`")
         return ir.EffectCall(function.result, function, args, span)
 
-    def _outside_arguments(self, name: str, function: ir.Extern, node: ast.Call, span: Span) -> tuple[ir.Expr, ...]:
+    def _in_execute(self, name: str, span: Span) -> None:
         if self.scope.method != "execute":
             why = "`start` has no host yet" if self.scope.method else "helpers are pure"
             why = why if self.scope.method or self.scope.result else "constants are folded at compile time"
             self.fail("E434", f"`{name}` is called in `execute` only", span, why=why, help="call it there")
+
+    def _outside_arguments(self, name: str, function: ir.Extern, node: ast.Call, span: Span) -> tuple[ir.Expr, ...]:
+        self._in_execute(name, span)
         if self._conditions:
             why = "the line must show whether the call is made"
             fix = f"write `value = {name}(…)` before, or an `if` around"
@@ -94,7 +142,8 @@ class CallChecker(Checker):
         )
 
     def _functions(self) -> list[str]:
-        return [*ops.BUILTINS, *CONSTRUCTORS, *HARDWARE, *self.scope.names.structs, *self.scope.functions.names()]
+        own = (*self.scope.names.structs, *self.scope.functions.names())
+        return [*ops.BUILTINS, *CONSTRUCTORS, *HARDWARE, EVENT, *own]
 
     def _dotted(self, function: ast.expr, span: Span) -> NoReturn:
         """Reports a call whose function is not a plain name, such as `math.sin(x)` or `x.copy()`."""

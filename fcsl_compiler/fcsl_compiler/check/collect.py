@@ -10,6 +10,7 @@ from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import SourceFile, Span
 from ..model import ir, ops
 from ..model.effects import HARDWARE
+from ..model.events import EVENT
 from ..model.types import SCALARS, Struct, TypeNames
 from ..parse.python_source import EDITOR_MODULES, span_of
 from .algorithm_class import METHODS, name_span, read_class
@@ -23,6 +24,7 @@ from .unsupported_python import instead_of_function, instead_of_import
 #: Names that fcsl_builtins offers in addition to the library.
 IMPORTABLE = (
     "extern",
+    EVENT,
     *HARDWARE,
     *ops.BUILTINS,
     *CONSTRUCTORS,

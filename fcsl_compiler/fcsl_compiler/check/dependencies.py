@@ -46,6 +46,8 @@ class _Walk:
                 if s.target is not None:
                     result = self._read(s.args) if s.is_hardware else frozenset({OUTSIDE})
                     self._write(s.target, result | condition)
+            elif isinstance(s, ir.Event):
+                pass
             elif isinstance(s, ir.If):
                 self._branch(s, condition | self._read([s.condition]))
             elif isinstance(s, ir.For):

@@ -42,7 +42,7 @@ class Hoister:
     def _statement(self, s: ir.Stmt, out: list[ir.Stmt]) -> ir.Stmt:
         if isinstance(s, ir.If):
             return replace(s, condition=self.expr(s.condition, out))
-        if isinstance(s, ir.Effect):
+        if isinstance(s, ir.Effect | ir.Event):
             return replace(s, args=self._arguments(s.args, out))
         if not isinstance(s, ir.Assign):
             return s

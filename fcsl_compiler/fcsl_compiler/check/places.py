@@ -10,6 +10,7 @@ from ..base.diagnostics import misspelt, nearest
 from ..base.source import Span
 from ..model import ir, ops
 from ..model.effects import HARDWARE
+from ..model.events import EVENT
 from ..model.types import BOOL, HEALTH_NAMES, I64, REQUEST, SCALARS, Array, Scalar, Struct, Type
 from .algorithm_class import METHODS, AlgorithmClass
 from .checker import Checker, Stop
@@ -61,7 +62,7 @@ class PlaceChecker(Checker):
                 why="a loop variable lives in its loop only",
                 help="copy it into a local inside the loop",
             )
-        if name in {*ops.BUILTINS, *HARDWARE, *scope.functions.externs} or scope.functions.is_function(name):
+        if name in {EVENT, *ops.BUILTINS, *HARDWARE, *scope.functions.externs} or scope.functions.is_function(name):
             self.fail("E404", f"`{name}` is a function, not a value", span, help=f"call it: `{name}(…)`")
         if name in SCALARS:
             self.fail("E404", f"`{name}` is a type, not a value", span, help="convert with it: `f64(x)`")

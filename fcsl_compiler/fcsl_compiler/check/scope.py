@@ -11,6 +11,7 @@ from typing import Protocol
 from ..base.source import SourceFile, Span
 from ..model import ir, ops
 from ..model.effects import HARDWARE
+from ..model.events import EVENT
 from ..model.literals import LiteralError
 from ..model.types import SCALARS, Array, Scalar, Struct, Type, TypeNames
 from .algorithm_class import AlgorithmClass
@@ -28,6 +29,7 @@ BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
 LANGUAGE_NAMES = frozenset(
     {
         "extern",
+        EVENT,
         *HARDWARE,
         *ops.BUILTINS,
         *CONSTRUCTORS,
@@ -42,7 +44,7 @@ LANGUAGE_NAMES = frozenset(
     }
 )
 #: Those that a constant or a local may have as its name, in a file that does not use them otherwise.
-SHADOWABLE = frozenset({*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS}) - ops.CONVERSIONS - frozenset(SCALARS)
+SHADOWABLE = frozenset({EVENT, *ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS}) - ops.CONVERSIONS - frozenset(SCALARS)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections import Counter
 from typing import NoReturn
 
@@ -12,6 +11,7 @@ from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model import ir, ops
 from ..model.effects import can_fault
+from ..model.events import MOST_TEXT, is_text
 from ..model.types import BOOL, HEALTH_NAMES, I64, Array, Results, Scalar, Type
 from .annotations import annotation_type
 from .checker import Stop
@@ -23,9 +23,6 @@ from .library_files import library_names
 from .loop_bounds import BEYOND, MAX_BOUND, MAX_ITERATIONS, TOO_MANY, parameters_in
 from .scope import LANGUAGE_NAMES, SHADOWABLE, Scope
 
-#: Characters of the text of an assertion.
-MOST_TEXT = 80
-_ASSERTION = re.compile(rf"[ -~]{{1,{MOST_TEXT}}}")
 STALE = HEALTH_NAMES.index("stale")
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
@@ -126,6 +123,8 @@ class BodyChecker:
                 out.append(self._return(node, span))
             finally:
                 self.scope.unreachable = self._jumped = True
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) and self.expr.is_event(node.value):
+            out.append(self.expr.event(node.value))
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) and self.expr.is_outside(node.value):
             out.append(self.expr.statement(node.value))
         elif isinstance(node, ast.Expr):
@@ -412,7 +411,7 @@ class BodyChecker:
         condition = self.expr.expect(node.test, BOOL, "the condition")
         literal = node.msg.value if isinstance(node.msg, ast.Constant) else None
         text = literal if isinstance(literal, str) else ""
-        if node.msg is not None and not _ASSERTION.fullmatch(text):
+        if node.msg is not None and not is_text(literal):
             fix = f'write it as `assert …, "dry mass"`, of 1 to {MOST_TEXT} printable characters of ASCII'
             self._fail("E410", "the text of this assertion", self.expr.span(node.msg), why="it is compiled", help=fix)
         if not always(fold(condition)):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from ..model import ir
 from ..model.effects import can_fault
+from ..model.events import MOST_VALUES, is_event_value, is_text
 from ..model.literals import STRING_LITERAL
 from ..model.machine import Machine
 from ..model.types import BOOL, Array, Scalar, Struct, Type, shape_of
@@ -58,6 +59,10 @@ class _Verifier:
                 _rule((s.target is None) == (s.function.result is None), f"result of {s.function.name} at {s.span}")
                 if s.target is not None:
                     _rule(self._place(s.target) and self._type(s.target) == s.function.result, f"target of {s.span}")
+            elif isinstance(s, ir.Event):
+                _rule(all(is_event_value(self._type(arg)) for arg in s.args), f"values of the event at {s.span}")
+                _rule(len(s.args) <= MOST_VALUES and is_text(s.text), f"the event at {s.span}")
+                _rule(not any(map(can_fault, s.args)), f"a fault inside the event at {s.span}")
             elif isinstance(s, ir.If):
                 _rule(self._type(s.condition) == BOOL, f"condition at {s.span}")
                 self._body(s.then)

@@ -10,11 +10,12 @@ from ..check.library_files import library_names, overloads
 from ..check.scope import CONSTRUCTORS
 from ..model import ops
 from ..model.effects import HARDWARE, HARDWARE_DOC
+from ..model.events import EVENT, EVENT_DOC
 
 
 def function_names() -> list[str]:
     """Names of all functions that an algorithm can call."""
-    return [*ops.DOCS, *CONSTRUCTORS, *HARDWARE, *library_names()]
+    return [*ops.DOCS, *CONSTRUCTORS, *HARDWARE, EVENT, *library_names()]
 
 
 def function_page(name: str) -> str | None:
@@ -25,8 +26,8 @@ def function_page(name: str) -> str | None:
         kinds = dict.fromkeys(str(op.args[-1]) for op in ops.all_ops() if op.name == name)
         lines = (doc.call, "", f"    {doc.meaning}", "", f"On: {', '.join(kinds)}.", f"Order: {doc.order}.")
         return "\n".join(lines) + f"\nSingular: {doc.singular}.\n{library}"
-    if name in CONSTRUCTORS:
-        call, _, meaning = CONSTRUCTORS[name].partition(": ")
+    if name in CONSTRUCTORS or name == EVENT:
+        call, _, meaning = {**CONSTRUCTORS, EVENT: EVENT_DOC}[name].partition(": ")
         return f"{call}\n\n    {meaning}\n"
     if name in HARDWARE:
         arguments = ", ".join(f"{n}: {t}" for n, t in HARDWARE[name].arguments)

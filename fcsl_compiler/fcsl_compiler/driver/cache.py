@@ -155,9 +155,8 @@ def _identity() -> str:
     # As Python itself notices that a module is newer than its .pyc. Contents took 6 to 13 ms where this takes 4.
     package = str(Path(__file__).parents[1])  # from here on without pathlib, which is slow
     files = sorted(_python_files(package))
-    files += [
-        f"{include_dirs()[0]}/fcsl/{name}" for name in ("fcsl_machine.h", "fcsl_monitor.h", "fcsl_hw.h", "fcsl_cover.h")
-    ]
+    headers = ("machine", "monitor", "hw", "event", "cover")
+    files += [f"{include_dirs()[0]}/fcsl/fcsl_{name}.h" for name in headers]
     try:
         return "\n".join(_stamp(file, package) for file in (*files, str(math_library())))
     except OSError as error:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 
 from ..model import ir
+from ..model.events import SEVERITIES
 from ..model.machine import Machine
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedMachine
@@ -111,6 +112,9 @@ def _body(statements: tuple[ir.Stmt, ...], depth: int) -> list[str]:
         elif isinstance(s, ir.Effect):
             target = f"{expr_text(s.target)} = " if s.target is not None else ""
             out.append(f"{pad}{target}effect {s.function.name}({', '.join(map(expr_text, s.args))})")
+        elif isinstance(s, ir.Event):
+            values = "".join(f", {expr_text(arg)}" for arg in s.args)
+            out.append(f"{pad}event {s.text!r}{values}, {SEVERITIES[s.severity]}")
         elif isinstance(s, ir.If):
             out += [f"{pad}if {expr_text(s.condition)}", *_body(s.then, depth + 1)]
             out += [f"{pad}else", *_body(s.otherwise, depth + 1)] if s.otherwise else []

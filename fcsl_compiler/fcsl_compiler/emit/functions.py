@@ -7,7 +7,8 @@ from __future__ import annotations
 from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.effects import can_fault
-from ..model.types import BOOL, U32, Array, Scalar, Struct, count_of
+from ..model.events import MOST_VALUES, site_of, sites_of
+from ..model.types import BOOL, U32, U64, Array, Scalar, Struct, count_of
 from .expressions import ExprEmitter, assigns_all, is_block, zero
 from .fault_places import FaultPlaces
 from .names import FAULT, HOST, RESULT
@@ -28,6 +29,7 @@ class FunctionEmitter(ExprEmitter):
     ):
         super().__init__(function, machine, places)
         self.record_types, self.inlined = record_types, inlined
+        self._sites = sites_of(function)
         #: Locals that hold what a fault restores from here on.
         self._remembered: set[str] = set()
 
@@ -61,7 +63,7 @@ class FunctionEmitter(ExprEmitter):
         made: list[tuple[str, code.Type]] = []
         for record in f.records:
             made.append((record, code.Pointer(code.Named(self.record_types[record]), record in ("outputs", "state"))))
-        if f.uses_hardware:
+        if f.takes_host:
             made.append((HOST.text, HOST_TYPE))
         for name, type_ in f.arguments:
             made.append((c_name(name), type_ if isinstance(type_, Scalar) else self.pointer_type(type_)))
@@ -120,6 +122,9 @@ class FunctionEmitter(ExprEmitter):
                         target(s.target)
                     for arg in s.args:
                         expression(arg)
+                elif isinstance(s, ir.Event):
+                    for arg in s.args:
+                        expression(arg)
                 elif isinstance(s, ir.If):
                     expression(s.condition)
                     body(s.then)
@@ -150,6 +155,9 @@ class FunctionEmitter(ExprEmitter):
             self.release()
         elif isinstance(s, ir.Effect):
             self._effect(s)
+            self.release()
+        elif isinstance(s, ir.Event):
+            self._event(s)
             self.release()
         elif isinstance(s, ir.If):
             self._if(s)
@@ -246,6 +254,15 @@ class FunctionEmitter(ExprEmitter):
             else:
                 self.copy(self._destination(s.target), given, result)
         self._check_fault()
+
+    def _event(self, s: ir.Event) -> None:
+        values: list[code.Expr] = []
+        for arg in s.args:
+            assert isinstance(arg.type, Scalar)
+            values.append(code.Call(f"fcsl_event_{arg.type.name.lower()}", (self.scalar(arg),)))
+        values += [code.Literal(0, U64)] * (MOST_VALUES - len(values))
+        number = code.Literal(self._sites.index(site_of(s)), U32)
+        self.out.add(code.Do(code.Call("fcsl_event", (HOST, number, *values))))
 
     def _apart(self, value: ir.Expr) -> code.Name:
         """Computes a value into separate storage."""

@@ -87,7 +87,7 @@ def _steps(place: code.Place) -> Iterator[str]:
 def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
     """Calls `execute` or `start` with the records of an instance."""
     arguments: list[code.Expr] = [code.Address(Member(record, name)) for name in function.records]
-    arguments += [_HOST] if function.uses_hardware else []
+    arguments += [_HOST] if function.takes_host else []
     return code.Do(code.Call(function.name, (*arguments, *([code.Address(fault)] if function.faults else []))))
 
 
@@ -159,7 +159,7 @@ class InstanceEmitter:
         return [*body, Set(_output("health"), health(3))]
 
     def _as_first(self) -> Function:
-        host = (_HOST,) if self.i.execute.uses_hardware else ()
+        host = (_HOST,) if self.i.execute.takes_host else ()
         run = Call(execute_name(self.m, self.first), (_SELF, *host))
         return replace(self._execute([code.Return(run)]), in_header=True)
 
@@ -179,7 +179,7 @@ class InstanceEmitter:
 
     def _execute(self, body: list[Statement]) -> Function:
         parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]
-        if self.i.execute.uses_hardware:
+        if self.i.execute.takes_host:
             parameters.append((_HOST.text, HOST_TYPE))
         comment = "Runs execute once with the inputs in the record. Returns 0, or the place of a fault; outputs and state then stay."
         return Function(execute_name(self.m, self.i), tuple(parameters), U32, tuple(body), comment, exported=True)
@@ -192,7 +192,8 @@ class InstanceEmitter:
         save, restore = self._saved()
         body = [*save, code.Var(_FAULT.text, U32), call(self.i.execute, Deref(_SELF), _FAULT)]
         faulted = code.Binary("!=", _FAULT, code.Literal(0, U32))
-        return [*body, If(faulted, (*restore, *self._failed(_FAULT))), *self._not_stale(), code.Return(_FAULT)]
+        undo = [code.Do(Call("fcsl_event_undo", (_HOST,)))] if self.i.execute.has_events else []
+        return [*body, If(faulted, (*restore, *undo, *self._failed(_FAULT))), *self._not_stale(), code.Return(_FAULT)]
 
     @property
     def _no_request(self) -> Name:

@@ -43,6 +43,7 @@ def emit_machine(machine: Machine, places: FaultPlaces, times: bool = False) -> 
         tables=tuple(_tables(machine, used)),
         functions=functions,
         uses_hardware=any(f.uses_hardware for f, _ in machine.entries),
+        has_events=any(f.has_events for f, _ in machine.entries),
         stack_bytes=stack_bytes((*described, *private), functions, f"fcsl_step_{machine.name}"),
     )
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from ..check.intervals import interval
 from ..model import ir
+from ..model.events import MOST_VALUES
 from ..model.ops import Op
 from ..model.program import Program
 from ..model.types import Scalar, count_of
@@ -75,6 +76,8 @@ class _Counting:
         if isinstance(s, ir.Effect):
             target = self._store(s.target, None) if s.target is not None else Counter()
             return sum(map(self._argument, s.args), Counter({s.function.name: 1})) + target
+        if isinstance(s, ir.Event):
+            return sum(map(self._value, s.args), Counter(store=1 + MOST_VALUES, branch=1))
         if isinstance(s, ir.Return) and s.value is not None:
             written = 0 if isinstance(s.value.type, Scalar) or isinstance(s.value, ir.Call) else count_of(s.value.type)
             return self._value(s.value) + Counter(store=written)

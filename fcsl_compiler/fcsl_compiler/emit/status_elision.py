@@ -17,14 +17,19 @@ _LONG = 20
 
 
 def quiet_instances(machine: Machine) -> frozenset[int]:
-    """The instances whose health is nominal after a usual tick: neither their algorithm, nor a channel, nor a substitute
-    for their effects sets it. The tick tests it instead of storing it, together with what a host injects. An injected
-    health is set before the algorithm runs, which must not read it either."""
+    """The instances without events whose health is nominal after a usual tick: neither their algorithm, nor a channel, nor
+    a substitute for their effects sets it. The tick tests it instead of storing it, together with what a host injects. An
+    injected health is set before the algorithm runs, which must not read it either."""
     guarded = {channel.port.instance for channel in sensors(machine)}
     return frozenset(
         n
         for n, i in enumerate(machine.instances)
-        if not (n in guarded or i.algorithm.effects or ir.names_field(i.execute.body, "outputs", "health"))
+        if not (
+            n in guarded
+            or i.algorithm.effects
+            or i.execute.has_events
+            or ir.names_field(i.execute.body, "outputs", "health")
+        )
     )
 
 

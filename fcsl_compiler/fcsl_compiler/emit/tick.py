@@ -10,6 +10,7 @@ from itertools import groupby
 from ..model import code
 from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement, Update
+from ..model.events import first_sites
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
 from .cold_paths import call_begin, call_fault, call_overrun, call_worsen
@@ -93,6 +94,7 @@ class TickEmitter:
         self.m, self.quiet, self.firsts, self.times = machine, quiet, firsts, times
         self.flatten = takes_bodies_in(machine)
         self.noted = noted_instances(machine)
+        self.first_sites = first_sites(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
         self.delayed = {c.target.instance for c in machine.connections if c.delayed}
         self.feeds: dict[int, list[Connection]] = {}
@@ -360,11 +362,15 @@ class TickEmitter:
             usual = (Binary("==", inject, Literal(0, code.U8)), Binary("==", health_of(instance), health(0)))
             runs = code.Or((code.And(usual), call_begin(self.m, instance)))
             return If(runs, (run_quiet(self.m, first, record),))
-        arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
+        arguments = (this, _HOST) if instance.execute.takes_host else (this,)
         worsen = If(Binary("!=", inject, Literal(0, code.U8)), (call_worsen(self.m, instance),))
         execute = Do(Call(execute_name(self.m, first), arguments), unused=True)
         is_fault = Binary("==", inject, Literal(1, code.U8))
-        whole = If(is_fault, (call_fault(self.m, instance),), (execute, worsen))
+        run: tuple[Statement, ...] = (execute, worsen)
+        if instance.execute.has_events:
+            site = Literal(self.first_sites[entry.instance], U32)
+            run = (Do(Call("fcsl_event_begin", (_HOST, site))), *run)
+        whole = If(is_fault, (call_fault(self.m, instance),), run)
         if not instance.algorithm.effects:
             return whole
         substitute = Member(Deref(_HOST), "substitute")

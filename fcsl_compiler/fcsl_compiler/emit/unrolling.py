@@ -50,7 +50,7 @@ def _operations(loop: ir.For) -> int:
     a call."""
     rounds, total = _rounds(loop), 0
     for s in _own(loop.body):
-        if isinstance(s, ir.Effect) or any(map(_calls, ir.expressions(s))):
+        if isinstance(s, ir.Effect | ir.Event) or any(map(_calls, ir.expressions(s))):
             return 0
         inner = _operations(s) if isinstance(s, ir.For) else 1
         if inner == 0:

@@ -546,6 +546,7 @@ class Program:
     tables: tuple[Table, ...]
     functions: tuple[Function, ...]
     uses_hardware: bool
+    has_events: bool
     stack_bytes: int  # about how much a step needs
 
     @property

@@ -339,7 +339,19 @@ class Effect:
 #: Header of the hardware builtins. Their C functions take the host as first argument.
 HARDWARE_HEADER = "fcsl/fcsl_hw.h"
 
-Stmt = Assign | Effect | If | For | Break | Continue | Return
+
+@dataclass(frozen=True)
+class Event:
+    """`event(text, …)`: told when the run of `execute` completes (events.py). It has no effect on the machine; its
+    arguments cannot fault."""
+
+    text: str
+    severity: int
+    args: tuple[Expr, ...]
+    span: Span
+
+
+Stmt = Assign | Effect | Event | If | For | Break | Continue | Return
 
 
 def constant_rounds(loop: For) -> int | None:
@@ -367,6 +379,8 @@ def expressions(s: Stmt) -> tuple[Expr, ...]:
         return (s.target, s.value)
     if isinstance(s, Effect):
         return s.args if s.target is None else (*s.args, s.target)
+    if isinstance(s, Event):
+        return s.args
     if isinstance(s, If):
         return (s.condition,)
     if isinstance(s, For):
@@ -433,6 +447,14 @@ class Function:
     @property
     def uses_hardware(self) -> bool:
         return any(isinstance(s, Effect) and s.is_hardware for s in walk(self.body))
+
+    @property
+    def has_events(self) -> bool:
+        return any(isinstance(s, Event) for s in walk(self.body))
+
+    @property
+    def takes_host(self) -> bool:
+        return self.uses_hardware or self.has_events
 
     @property
     def returned(self) -> str:

@@ -171,6 +171,8 @@ class _Body:
         elif isinstance(s, ir.Effect):
             if s.target is not None:
                 self.assign(s.target, self.x.effect(s), path)
+        elif isinstance(s, ir.Event):
+            pass
         elif isinstance(s, ir.If):
             return self._if(s, path)
         elif isinstance(s, ir.For):

@@ -11,8 +11,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeGuard
 
+from ..model.events import EVENT
 from .annotations import split_type
 from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 
@@ -103,6 +104,11 @@ class Names:
         assert isinstance(node.func, ast.Name)
         variant = f"{node.func.id}__{len(node.args)}"
         return variant if variant in self.functions else node.func.id
+
+
+def is_event(node: ast.expr) -> TypeGuard[ast.Call]:
+    """Whether a statement is `event(text, …)`."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == EVENT
 
 
 class Node:
@@ -213,6 +219,9 @@ class Inference:
             self._loops.discard(s.target.id)
         elif isinstance(s, ast.Return) and s.value is not None:
             self._return(s.value)
+        elif isinstance(s, ast.Expr) and is_event(s.value):
+            for arg in s.value.args[1:]:
+                self.expr(arg)
         elif isinstance(s, ast.Expr):
             self.expr(s.value)
 

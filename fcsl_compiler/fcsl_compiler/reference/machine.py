@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from ..model.events import EVENT
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
@@ -33,6 +34,9 @@ from .structs import Struct, slot
 from .types import SCALARS, Scalar, Type
 from .values import I64, Fault
 
+#: instance, file, line, column: of a row of the table event_sites of fcsl_machine.h.
+EventRow = tuple[int, str, int, int]
+
 _NONE, _LONG = -1, 2**64 - 1
 _NOMINAL, _DEGRADED, _FAILED, _STALE = range(len(HEALTH))
 
@@ -40,7 +44,8 @@ _NOMINAL, _DEGRADED, _FAILED, _STALE = range(len(HEALTH))
 class Offered(Protocol):
     """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
     name; `substitute`, called before an impure instance executes, which returns True if it has stored the results of
-    this execute itself; and `executed`, called after such an execute."""
+    this execute itself; `executed`, called after such an execute; and `event`, called with the site and the values of
+    each event of an execute that completed."""
 
     @property
     def clock_ns(self) -> Callable[[], int] | None: ...
@@ -50,6 +55,8 @@ class Offered(Protocol):
     def substitute(self) -> Callable[[int], bool] | None: ...
     @property
     def executed(self) -> Callable[[int], None] | None: ...
+    @property
+    def event(self) -> Callable[[int, Sequence[Any]], None] | None: ...
 
 
 @dataclass
@@ -60,6 +67,7 @@ class Host:
     hardware: Mapping[str, Callable[..., Any]] | None = None
     substitute: Callable[[int], bool] | None = None
     executed: Callable[[int], None] | None = None
+    event: Callable[[int, Sequence[Any]], None] | None = None
 
 
 def _cell(path: str, layout: Layout, size: int) -> int:
@@ -258,6 +266,7 @@ class ReferenceMachine:
         layout: Layout,
         places: Sequence[FaultRow],
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
+        events: Sequence[EventRow] = (),
     ):
         self.machine, self.layout = machine, layout
         self.host: Offered = Host()
@@ -271,6 +280,8 @@ class ReferenceMachine:
         parts = {name: part["requests"] for name, part in config.get("parts", {}).items()}
         self.requests = {name: Requests(machine.requests, name, {"": {}, **parts}) for name in ("", *parts)}
         self.literals = Literals(config, Path(machine.config.path).parent)
+        self._events: list[tuple[tuple[int, int], tuple[Any, ...]]] = []  # of the execute that runs
+        self._sites = self._numbered(events)
         self._algorithms = self._load(config, externs)
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._instances: list[_Instance] = []
@@ -311,6 +322,7 @@ class ReferenceMachine:
                 made = modules[path] = SourceModule(sources[path].text, str(path.resolve()), structs, beside)
                 for builtin in HARDWARE:
                     made.bind(builtin, self._hardware(builtin))
+                made.bind(EVENT, self._event)
                 for extern in made.externs.values() if externs is not None else ():
                     assert externs is not None
                     made.bind(extern.name, externs(extern))
@@ -338,6 +350,23 @@ class ReferenceMachine:
             return type_.zero() if found is None else type_.store(found)
 
         return call
+
+    def _numbered(self, events: Sequence[EventRow]) -> list[dict[tuple[int, int], int]]:
+        """For each instance the numbers of its sites, by line and by offset in bytes of that line."""
+        sources = {source.name: source for source in self.machine.sources}
+        found: list[dict[tuple[int, int], int]] = [{} for _ in self.machine.instances]
+        for number, (instance, file, line, column) in enumerate(events):
+            found[instance][line, len(sources[file].line(line)[: column - 1].encode())] = number
+        return found
+
+    def _event(self, line: int, offset: int, *values: Any) -> None:
+        self._events.append(((line, offset), values))
+
+    def _tell(self, index: int) -> None:
+        """Gives the host the events of an execute that completed."""
+        if self.host.event is not None:
+            for place, values in self._events:
+                self.host.event(self._sites[index][place], values)
 
     # ---- connections -----------------------------------------------------------------------------------------------
 
@@ -428,7 +457,7 @@ class ReferenceMachine:
         }
         return sources[source.members[0]]
 
-    # ---- the three entries -----------------------------------------------------------------------------------------
+    # ---- the four entries -----------------------------------------------------------------------------------------
 
     def _image_of(self, memory: Memory) -> Image:
         if memory is not self._image.memory:
@@ -515,6 +544,7 @@ class ReferenceMachine:
             instance.store_inputs(instance.self_, image.bytes)
         image.words[self._current], faults = index, image.longs[instance.faults]
         substitute = self.host.substitute if instance.algorithm.impure else None
+        self._events.clear()
         if substitute is None or not substitute(index):
             instance.execute(image)
             executed = self.host.executed if instance.algorithm.impure else None
@@ -524,6 +554,7 @@ class ReferenceMachine:
             image.bytes[instance.inject_fault] = 0  # the substituted record contains its effect
         if image.longs[instance.faults] == faults:
             self._note_completed(image, instance, tick)
+            self._tell(index)
         if instance.limit_ns:
             self._judge_time(image, instance)
         for sensor in self._sensors_of[index]:

@@ -9,7 +9,7 @@
 - Where the kinds of values are certain, what is known is not asked again: members are read and stored in their slots,
   elements in the list of the array (if the index is known to be inside), functions of the library are those for the
   sizes at hand.
-- `assert c, text` is a call.
+- `assert c, text` is a call. `event(text, …)` gets its place in the file instead of its text and severity.
 - `x += v` is `x = x + v`; a subscript of x that reaches outside the machine is evaluated once, before. Annotations, imports and
   the dictionaries of a class are taken out.
 """
@@ -26,7 +26,7 @@ from typing import Any
 from .arrays import Array, ArrayType, array_type
 from .elementwise import OPERATIONS, elementwise
 from .functions import CONVERSIONS
-from .infer import PLAIN, SELF, Inference, Kind, Names
+from .infer import PLAIN, SELF, Inference, Kind, Names, is_event
 from .structs import slot
 from .types import SCALARS
 from .values import F32, INTEGERS, decimal_f32
@@ -378,8 +378,13 @@ class Rewriter:
                 return ast.Return(self._values(node.value))
             return ast.Return(self._stored(node.value))
         if isinstance(node, ast.Expr):
-            return ast.Expr(self.expr(node.value))
+            return ast.Expr(self._event(node.value) if is_event(node.value) else self.expr(node.value))
         return node
+
+    def _event(self, node: ast.Call) -> ast.expr:
+        place = [ast.Constant(node.lineno), ast.Constant(node.col_offset)]
+        values = [self.expr(arg) for arg in node.args[1:]]
+        return ast.copy_location(ast.Call(node.func, [*place, *values], []), node)
 
     def _stored(self, node: ast.expr) -> ast.expr:
         """The value stored in a local or result. Arrays and structs are copied if the value is a place."""

@@ -209,6 +209,41 @@ typedef struct {
     const char *cause; /* "the divisor is zero" */
 } fcsl_fault_place_t;
 
+/* Values of an event, and events of a tick. Those of a tick that find no room are counted. */
+enum { FCSL_EVENT_VALUES = 4, FCSL_EVENTS_PER_TICK = 64 };
+
+/* As SEVERITIES of the compiler, in this order. */
+typedef enum { FCSL_DEBUG = 0, FCSL_INFO = 1, FCSL_WARNING = 2, FCSL_ERROR = 3 } fcsl_severity_t;
+
+/* A place in the source that reports an event, once for each instance that it belongs to. */
+typedef struct {
+    uint32_t instance; /* index into instances; its sites are consecutive */
+    const char *file; /* as the machine JSON names it */
+    uint32_t line; /* from 1 */
+    uint32_t column; /* in characters, from 1 */
+    const char *text;
+    uint8_t severity; /* fcsl_severity_t */
+    uint8_t value_count;
+    uint8_t types[FCSL_EVENT_VALUES]; /* fcsl_type_t */
+} fcsl_event_site_t;
+
+/* Values in the low bytes; bools, integers and healths are extended to 64 bits. Those beyond value_count are 0. */
+typedef struct {
+    uint32_t site; /* index into event_sites */
+    uint64_t values[FCSL_EVENT_VALUES];
+} fcsl_event_t;
+
+/* The events of a tick, in order. A host sets `count` and `lost` to 0 before it. */
+typedef struct {
+    uint32_t count;
+    uint32_t lost; /* without room */
+    /* Of the execute that runs: the first site of its instance, and what a fault goes back to. */
+    uint32_t first_site;
+    uint32_t count_before;
+    uint32_t lost_before;
+    fcsl_event_t list[FCSL_EVENTS_PER_TICK];
+} fcsl_events_t;
+
 /* Hardware I/O of a board; declared in fcsl_hw.h, null for machines that use none. */
 struct fcsl_hw;
 
@@ -225,6 +260,7 @@ typedef struct {
     /* Called by measured machines before the first instance of a tick, with FCSL_NONE, and after each one that was due, with its
      * index: the time between two calls is that of the instance. May be null. It must not change the machine. */
     void (*measure)(void *ctx, int32_t instance);
+    fcsl_events_t *events; /* null: events are lost */
 } fcsl_host_t;
 
 typedef struct {
@@ -282,6 +318,8 @@ typedef struct {
      * and the new state continue, the others become stale. If `state` is already active, only its time restarts. */
     void (*force_state)(void *machine, int32_t state);
     uint8_t measured; /* built with --times: a step calls `measure` of its host */
+    const fcsl_event_site_t *event_sites; /* in the order of their instances */
+    uint32_t event_site_count;
 } fcsl_machine_t;
 
 /* Exported by every machine library; ends with a null pointer. */

@@ -49,6 +49,8 @@ def run(m: Machine, case: Case) -> Trace:
 def _fields(m: Machine, board: Board) -> Fields:
     requests = _requests(m)
     found: Fields = {"hardware": list(board.calls), "externs": board.externs.text()}
+    lost, told = m.told()
+    found["events"] = [lost, *(part for name, _, text, values in told for part in (f"{name} {text}", *values))]
     for path, field in m.fields.items():
         names = {"request": requests, "health": HEALTH, "state": m.states}.get(TYPES[field.type])
         found[path] = [names[v] if names else v for v in m.raw(path)]

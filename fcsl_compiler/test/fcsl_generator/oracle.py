@@ -304,6 +304,8 @@ def _wrap_angle(type_: Type, x: Any) -> Any:
 # ---- trees ---------------------------------------------------------------------------------------------------------
 
 Records = dict[str, dict[str, Any]]
+#: Text and values of an event.
+Told = tuple[str, list[Any]]
 
 
 class Frame:
@@ -311,6 +313,7 @@ class Frame:
 
     def __init__(self, constants: dict[str, Any], names: dict[str, Any], records: Records, board: Board | None = None):
         self.constants, self.names, self.records, self.board = constants, names, records, board
+        self.events: list[Told] = []
 
     def value(self, e: t.Expr) -> Any:
         with np.errstate(all="ignore"):
@@ -459,6 +462,9 @@ class Frame:
     def _do_perform(self, s: t.Perform) -> None:
         self.value(s.call)
 
+    def _do_event(self, s: t.Event) -> None:
+        self.events.append((s.text, [self.value(v) for v in s.values]))
+
     def _do_if(self, s: t.If) -> None:
         for condition, block in s.branches:
             if condition is None or self.value(condition):
@@ -521,12 +527,14 @@ def records_of(algorithm: t.Algorithm) -> Records:
     return records
 
 
-def call(function: t.Function, records: Records, board: Board | None = None) -> None:
-    """Runs execute or start on these records. Raises Fault; earlier writes remain."""
+def call(function: t.Function, records: Records, board: Board | None = None) -> list[Told]:
+    """Runs execute or start on these records. Raises Fault; earlier writes remain. Returns its events."""
+    frame = Frame(constants_of(function.constants), {}, records, board)
     try:
-        Frame(constants_of(function.constants), {}, records, board).run(function.block)
+        frame.run(function.block)
     except _Return:
         pass
+    return frame.events
 
 
 def assigned(block: t.Block) -> set[str]:

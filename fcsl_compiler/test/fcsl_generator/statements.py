@@ -39,7 +39,7 @@ class Statements:
     def __init__(self, choices: Choices, scope: Scope, palette: tuple[Type, ...], fuel: int, library: bool):
         self.c, self.scope, self.palette = choices, scope, palette
         self.e = Expressions(choices, scope, fuel, library)
-        self._loops = 0
+        self._loops = self._events = 0
         self._pending: list[t.Stmt] = []  # statements that determine the types of new locals with literals
 
     def body(self, most: int) -> t.Block:
@@ -87,6 +87,7 @@ class Statements:
             (4 if s.method == "execute" else 0, lambda: (self._health(), False)),
             (3 if s.method == "execute" else 0, lambda: (self._hardware(), False)),
             (8 if s.externs and s.method == "execute" else 0, lambda: (self._extern(), False)),
+            (4 if s.method == "execute" else 0, lambda: (self._event(), False)),
             (8 if self._request_field() else 0, lambda: (self._request(), False)),
             (6 if s.loops and nesting < 2 else 0, self._jump),
             (3 if nesting < 2 else 0, self._return),
@@ -141,6 +142,12 @@ class Statements:
             return t.Assign(self._target(value.type), value)
         name, args = self.c.pick(_WRITES)
         return t.Perform(t.Call("bool", name, tuple(self.e.expr(k, 2, FREE) for k in args)))
+
+    def _event(self) -> t.Stmt:
+        c, kinds = self.c, [k for k in (*NUMBERS, "bool", HEALTH) if self.e.knows(k)]
+        values = tuple(self.e.expr(c.pick(kinds), 2, TYPED) for _ in range(c.upto(4)))
+        self._events += 1
+        return t.Event(f"e{self._events}", values, c.pick(("", "debug", "info", "warning", "error")))
 
     def _extern(self) -> t.Stmt:
         """A call as a statement. A result, if any, is stored."""

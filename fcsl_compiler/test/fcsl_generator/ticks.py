@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from .machines import Action, Case
 from .requirements import ActingOracle
 from .types import HEALTH_NAMES, Type, leaves
 
+EVENTS_PER_TICK = 64
 #: Path of a leaf and its plain values, flat: one field as seen by a host.
 Fields = dict[str, list[Any]]
 
@@ -46,6 +47,7 @@ class OracleMachine:
         #: Requests that were lost to another transition, by state and priority.
         self.lost = {(s, e["priority"]): 0 for s in self.config["states"] for e in self._edges(s)}
         self.board = Board(case.board, Calls())
+        self.events: list[list[Any]] = []  # of the last tick: instance and text, values
         self.acting = {one.id: ActingOracle(one) for one in case.acting}
         self.failed_start = self._init()
 
@@ -142,6 +144,7 @@ class OracleMachine:
             for connection, value in yesterday:
                 if connection["to"].split(".")[0] in due:
                     self._deliver(connection, value)
+        self.events = []
         for name in due:
             self._execute(name)
         self._act_by_requirements(due)
@@ -229,10 +232,11 @@ class OracleMachine:
         try:
             if injected == "fault":
                 raise oracle.Fault("injected")
-            oracle.call(self.algorithm(name).execute, records, self.board)
+            events = oracle.call(self.algorithm(name).execute, records, self.board)
             self._check_finite(name, self.algorithm(name).execute)
             self.last_run[name] = self.tick
             self.resumes.discard(name)
+            self.events += [[f"{name} {text}", *values] for text, values in events]
         except oracle.Fault as fault:
             self.counters[name]["fault_place"] = str(fault)  # the oracle knows only the cause of a fault, not its place
             records["outputs"], records["state"] = before
@@ -325,6 +329,7 @@ class OracleMachine:
             "machine.tick": [self.tick],
             "hardware": list(self.board.calls),
             "externs": self.board.externs.text(),
+            "events": [max(0, len(self.events) - EVENTS_PER_TICK), *chain(*self.events[:EVENTS_PER_TICK])],
         }
         timed = any("after_s" in e for e in self.config.get("transitions", []))
         if timed or any(c["from"] == "machine.ticks_in_state" for c in self.connections):

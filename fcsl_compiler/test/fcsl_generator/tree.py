@@ -256,6 +256,20 @@ class Perform:
 
 
 @dataclass(frozen=True)
+class Event:
+    """event(text, …)"""
+
+    text: str
+    values: tuple[Expr, ...]
+    severity: str  # "": not written
+
+    def lines(self) -> Iterator[str]:
+        parts = [f'"{self.text}"', *map(str, self.values)]
+        parts += [f'severity="{self.severity}"'] if self.severity else []
+        yield f"event({', '.join(parts)})"
+
+
+@dataclass(frozen=True)
 class If:
     """if / elif … / else: conditions with their blocks. With an else, the last block has no condition."""
 
@@ -289,7 +303,7 @@ class Jump:
         yield self.word if self.value is None else f"{self.word} {self.value}"
 
 
-Stmt = Assign | Unpack | Perform | If | For | Jump
+Stmt = Assign | Unpack | Perform | Event | If | For | Jump
 Block = tuple[Stmt, ...]
 
 

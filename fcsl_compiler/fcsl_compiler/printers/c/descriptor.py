@@ -11,6 +11,7 @@ from ...emit.field_table import field_table, layout_hash, source_hash
 from ...emit.messages import message_definition, message_name
 from ...emit.names import channel_member
 from ...model.c_names import c_literal, c_string
+from ...model.events import SEVERITIES, sites_of
 from ...model.machine import Channel, Machine, PortRef
 from ...model.types import F64, Scalar, element_of, leaves
 from ...ros.channels import by_topic, message_of, payload_of
@@ -64,6 +65,7 @@ class DescriptorEmitter:
         self._channels()
         self._ros_messages()
         self._fault_places()
+        self._event_sites()
         self._machine()
 
     def _offset(self, member: str) -> str:
@@ -189,6 +191,17 @@ class DescriptorEmitter:
         rows = [f"{{{c_string(p.file)}, {p.line}u, {p.column}u, {c_string(p.cause)}}}" for p in self.places.rows]
         self.fault_places = self._table("fcsl_fault_place_t", f"fcsl_fault_places_{self.m.name}", rows)
 
+    def _event_sites(self) -> None:
+        rows = []
+        for number, instance in enumerate(self.m.instances):
+            for s in sites_of(instance.execute):
+                types = ", ".join(s.types) or "0"
+                rows.append(
+                    f"{{{number}u, {c_string(s.file)}, {s.line}u, {s.column}u, {c_string(s.text)}, "
+                    f"FCSL_{SEVERITIES[s.severity].upper()}, {len(s.types)}u, {{{types}}}}}"
+                )
+        self.event_sites = self._table("fcsl_event_site_t", f"fcsl_event_sites_{self.m.name}", rows), len(rows)
+
     def _machine(self) -> None:
         m = self.m
         rows = {
@@ -225,6 +238,9 @@ class DescriptorEmitter:
             rows["payloads"] = self.payloads
         if self.times:
             rows["measured"] = "1"
+        table, count = self.event_sites
+        if count:
+            rows |= {"event_sites": table, "event_site_count": f"{count}u"}
         if m.command_timeout_ns:
             rows["command_timeout_ns"] = f"UINT64_C({m.command_timeout_ns})"
         if self.after_ticks != "NULL":

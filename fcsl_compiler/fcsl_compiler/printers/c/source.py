@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from ...model import code
 from ...model.c_names import c_comment
+from ...model.events import EVENT_HEADER
 from ...model.ir import HARDWARE_HEADER
 from ..spelling import Spelling
 from .expressions import CExpressions, declarator, type_name
@@ -51,6 +52,8 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     w.line()
     if program.uses_hardware:
         w.line(f"#include <{HARDWARE_HEADER}>")
+    if program.has_events:
+        w.line(f"#include <{EVENT_HEADER}>")
     w.line("#include <fcsl/fcsl_exact_math.h>")
     w.line("#include <fcsl/fcsl_math.h>")
     for header in program.headers:

@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from ...emit.functions import HOST_TYPE
 from ...model import code
 from ...model.effects import HARDWARE
+from ...model.events import EVENT_HEADER, MOST_VALUES, is_event_value
 from ...model.ir import HARDWARE_HEADER
-from ...model.types import Scalar
+from ...model.types import SCALARS, U32, U64, Scalar
 from ..c.header import header_guard
 from ..c.source import PRAGMAS, include_of, print_externs, print_record
 from ..c.writer import CWriter
@@ -41,6 +42,7 @@ type
     substitute*: proc (ctx: pointer, instance: uint32): int32 {.cdecl, raises: [].}
     executed*: proc (ctx: pointer, instance: uint32) {.cdecl, raises: [].}
     measure*: proc (ctx: pointer, instance: int32) {.cdecl, raises: [].}
+    events*: pointer
 """
 
 #: Nim has no pointers to constants.
@@ -156,7 +158,19 @@ def _foreign(module: Module, program: code.Program) -> list[str]:
             result = builtin.result
             assert result is None or isinstance(result, Scalar)
             made.append(_declaration(module, builtin.name, types, result, f'header: "{HARDWARE_HEADER}"'))
+    if program.has_events:
+        made += _event_functions(module)
     return made
+
+
+def _event_functions(module: Module) -> list[str]:
+    functions: list[tuple[str, list[code.Type], Scalar | None]] = [
+        ("fcsl_event_begin", [HOST_TYPE, U32], None),
+        ("fcsl_event_undo", [HOST_TYPE], None),
+        ("fcsl_event", [HOST_TYPE, U32, *[U64] * MOST_VALUES], None),
+    ]
+    functions += [(f"fcsl_event_{t.name.lower()}", [t], U64) for t in SCALARS.values() if is_event_value(t)]
+    return [_declaration(module, name, types, r, f'header: "{EVENT_HEADER}"') for name, types, r in functions]
 
 
 def _declaration(
