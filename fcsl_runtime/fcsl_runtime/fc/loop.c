@@ -40,6 +40,11 @@ int loop_open(loop_t *loop)
     if (verdicts != NULL) {
         parts[count++] = (fcsl_part_t){.data = verdicts, .size = verdict_bytes};
     }
+    uint32_t time_bytes = 0;
+    const fcsl_time_row_t *times = fcsl_run_times(loop->run, &time_bytes);
+    if (times != NULL) {
+        parts[count++] = (fcsl_part_t){.data = times, .size = time_bytes};
+    }
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
     if (loop->actuator_bytes == NULL ||

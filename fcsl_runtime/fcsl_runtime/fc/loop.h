@@ -19,8 +19,8 @@
 
 typedef enum { GUARD_NONE, GUARD_THERE, GUARD_ENDED } guard_state_t;
 
-/* What the loop publishes: the machine, what the HAL knows of itself, the verdicts on requirements. */
-enum { LOOP_PARTS_MAX = 3 };
+/* What the loop publishes: the machine, what the HAL knows of itself, the verdicts on requirements, the times of instances. */
+enum { LOOP_PARTS_MAX = 4 };
 
 typedef struct {
     fcsl_run_t *run;

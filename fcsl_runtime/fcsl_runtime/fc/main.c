@@ -156,6 +156,12 @@ static int open_run(program_t *program)
         program->blocks[program->block_count++] =
             (fcsl_vars_block_t){.prefix = "requirements", .fields = fields, .field_count = verdicts};
     }
+    uint32_t times = 0;
+    const fcsl_field_t *time_fields = fcsl_run_time_fields(loop->run, &times);
+    if (time_fields != NULL) {
+        program->blocks[program->block_count++] =
+            (fcsl_vars_block_t){.prefix = "times", .fields = time_fields, .field_count = times};
+    }
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
     loop->missed_deadline = program->options.missed_deadline;

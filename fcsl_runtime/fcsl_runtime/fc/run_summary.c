@@ -10,6 +10,7 @@
 
 #include "summary_file.h"
 #include "log.h"
+#include "times_summary.h"
 #include "run/lost_requests.h"
 
 enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024, REQUIREMENTS_BYTES = 1024, ANEW_BYTES = 128 };
@@ -148,6 +149,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
     }
     report_times("lateness ", &stats->lateness);
     report_times("tick time", &stats->tick_time);
+    report_instance_times(loop->run);
 }
 
 int write_run_summary(const loop_t *loop, const char *summary_file, const char *ended)

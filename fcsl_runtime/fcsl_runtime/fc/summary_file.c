@@ -114,6 +114,7 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     put_counters(out, machine, &loop->stats, data);
     fcsl_vars_lost_requests(out, machine, data);
     fcsl_vars_requirements(out, loop->run, loop_verdicts(loop, data));
+    fcsl_vars_times(out, loop->run);
     fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
     fcsl_vars_histogram(out, "tick_time_ns", &loop->stats.tick_time);
     fcsl_json_raw(out, "}\n");

@@ -69,6 +69,15 @@ class CVerdict(Structure):
     ]
 
 
+class CTime(Structure):
+    """fcsl_run_time_t"""
+
+    _fields_ = [
+        ("name", c_char_p),
+        *((name, c_uint64) for name in ("runs", "total_ns", "mean_ns", "p50_ns", "p99_ns", "max_ns")),
+    ]
+
+
 #: FCSL_VERDICT_TEXT_MAX
 VERDICT_TEXT_BYTES = 1280
 
@@ -89,6 +98,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),
     "fcsl_run_tick": (c_uint64, [ptr]),
+    "fcsl_run_time": (c_int, [ptr, c_uint32, POINTER(CTime)]),
     "fcsl_run_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_check_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),

@@ -21,6 +21,7 @@ from .library import runtime_library
 from .parameters import CParameters, Parameters
 
 if TYPE_CHECKING:
+    from .instance_times import InstanceTime
     from .requirements import Verdict
 
 #: fcsl_tick_message_t by topic.
@@ -157,6 +158,12 @@ class Run:
         from .requirements import read_verdicts
 
         return read_verdicts(self._lib, self.handle())
+
+    def times(self) -> dict[str, InstanceTime]:
+        """How long the machine's instances, and its steps, took so far. Empty if it is not measured."""
+        from .instance_times import read_times
+
+        return read_times(self._lib, self.handle())
 
     def observed(self) -> list[str]:
         """Paths of the values that the requirements read, in the order of a row of `judge`; some occur several times."""

@@ -30,10 +30,11 @@ from simclient.vars.arguments import make_parser
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.find import Server, find_server, named_address, running_servers
+from simclient.vars.screen import Screen
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
 from simclient.vars.value_text import read_value
-from simclient.vars.watch import _draw, _Table, _until
+from simclient.vars.watch import _Table, _until
 from simclient.vars.wire import VarError
 from simclient.verbs import COMMANDS
 
@@ -308,12 +309,12 @@ def test_what_a_terminal_has_no_room_for_is_told(
         values = {f"f{i}": 0 for i in range(fields)}
         table = _Table(dict.fromkeys(values, "m"))
         table.take(Sample(7, 0, 0, values))
-        assert _draw(table, 0) == 4
+        Screen().draw(table.lines(*Screen.size()))
         lines = [line.removesuffix("\x1b[K") for line in capsys.readouterr().out.removesuffix("\x1b[J").splitlines()]
         assert lines == shown + ["… 2 lines more: no room"] * (fields - 3)
     table = _Table({"p": ""})
     table.take(Sample(7, 0, 0, {"p": [1.0] * 9}))
-    _draw(table, 0)
+    Screen().draw(table.lines(*Screen.size()))
     assert capsys.readouterr().out.splitlines()[1] == "p  [1.0, 1.0, 1.0, 1.0,…\x1b[K"
 
 

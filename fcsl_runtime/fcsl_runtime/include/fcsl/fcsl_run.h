@@ -282,6 +282,36 @@ void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, f
 const fcsl_field_t *fcsl_run_kept_values(const fcsl_run_t *run, uint32_t index, uint32_t *count);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
 void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
+
+/* ---- times of instances ------------------------------------------------------------------------------------------ */
+
+/* Of one instance of a machine that was built with --times, or of its whole step. From its due time on: connected inputs are
+ * copied, execute runs, its health is judged. */
+typedef struct {
+    uint64_t runs; /* executes so far, faulted ones included */
+    uint64_t total_ns;
+    uint64_t last_ns; /* of the last run */
+    uint64_t max_ns;
+} fcsl_time_row_t;
+
+typedef struct {
+    const char *name; /* of the instance; "machine": the whole step */
+    uint64_t runs;
+    uint64_t total_ns;
+    uint64_t mean_ns;
+    uint64_t p50_ns; /* at most 1/32 too large, as is p99 */
+    uint64_t p99_ns;
+    uint64_t max_ns;
+} fcsl_run_time_t;
+
+/* A row for each instance, in the machine's order, and one for the step, of the same address each time; null where the machine is
+ * not measured. Read by the thread that steps. */
+const fcsl_time_row_t *fcsl_run_times(const fcsl_run_t *run, uint32_t *size);
+/* What is served of the rows: `<instance>.runs` and its like, none writable; null where the machine is not measured. */
+const fcsl_field_t *fcsl_run_time_fields(const fcsl_run_t *run, uint32_t *count);
+/* Row `index`, from any thread; 0, or -1: there is none. */
+int fcsl_run_time(const fcsl_run_t *run, uint32_t index, fcsl_run_time_t *time);
+
 /* ---- views ------------------------------------------------------------------------------------------------------- */
 
 /* What plots and viewers show of this run (docs/reference/language.md): the machine's own views, or those of its host; "" for none. Bags

@@ -18,6 +18,7 @@
 #include "requirements.h"
 #include "stack_left.h"
 #include "record/write_queue.h"
+#include "instance_times.h"
 #include "io_replay.h"
 #include "trace.h"
 #include "validate.h"
@@ -120,7 +121,7 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     run->host.ctx = run;
     run->host.substitute = fcsl_io_replay_apply;
     run->host.executed = fcsl_io_replay_executed;
-    return fcsl_io_replay_open(run, error);
+    return fcsl_times_open(run, error) == 0 ? fcsl_io_replay_open(run, error) : -1;
 }
 
 static int bind_parameter(void *ctx, uint32_t field, const void *bytes, fcsl_error_t *error)
@@ -164,6 +165,7 @@ static void release(fcsl_run_t *run)
     fcsl_io_replay_free(run);
     fcsl_trace_free(run);
     fcsl_monitor_close(run);
+    fcsl_times_close(run);
     fcsl_write_queue_close(run->write_queue);
     free(run->layouts);
     free(run->watched);

@@ -11,6 +11,7 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
+#include "instance_times.h"
 #include "io_replay.h"
 #include "machine/monitor_memory.h"
 #include "requirements.h"
@@ -176,7 +177,13 @@ static void note_new_overruns(fcsl_run_t *run, uint64_t tick)
 /* One tick of the machine; fails when it did not complete it. */
 static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 {
+    if (run->times != NULL) {
+        fcsl_times_begin(run);
+    }
     run->machine->step(run->data, &run->host);
+    if (run->times != NULL) {
+        fcsl_times_end(run);
+    }
     if (run->impure_count > 0) {
         fcsl_io_replay_settle(run);
     }
@@ -219,6 +226,9 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
         fcsl_recorder_tick(run->recorder, fcsl_run_stamp(run, tick));
         if (run->monitor != NULL) {
             fcsl_monitor_note(run, tick);
+        }
+        if (run->times != NULL) {
+            fcsl_times_note(run, tick);
         }
     }
     return 0;

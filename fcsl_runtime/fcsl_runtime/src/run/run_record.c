@@ -2,6 +2,7 @@
  *
  * What a run tells of itself: to its recorder, to whoever follows its host writes, and as messages of its last tick.
  */
+#include "instance_times.h"
 #include "record/write_queue.h"
 #include "record/recorder.h"
 #include "requirements.h"
@@ -20,7 +21,16 @@ int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_
                                        .first = fcsl_run_stamp(run, fcsl_run_tick(run))};
     fcsl_monitor_record(run);
     run->recorder = fcsl_recorder_open(&start, options, error);
-    return run->recorder != NULL ? 0 : -1;
+    if (run->recorder == NULL) {
+        return -1;
+    }
+    if (fcsl_times_record(run, options->name_space, error) != 0) {
+        fcsl_error_t unused;
+        (void)fcsl_recorder_close(run->recorder, &unused);
+        run->recorder = NULL;
+        return -1;
+    }
+    return 0;
 }
 
 int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)

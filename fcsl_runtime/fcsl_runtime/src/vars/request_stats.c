@@ -132,6 +132,26 @@ void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const u
     fcsl_vars_end(out);
 }
 
+void fcsl_vars_times(fcsl_vars_out_t *out, const fcsl_run_t *run)
+{
+    fcsl_run_time_t time;
+    if (fcsl_run_time(run, 0, &time) != 0) {
+        return;
+    }
+    fcsl_vars_begin(out, "times");
+    for (uint32_t i = 0; fcsl_run_time(run, i, &time) == 0; i++) { /* ends behind the last row */
+        fcsl_vars_begin(out, time.name);
+        fcsl_vars_number(out, "runs", time.runs);
+        fcsl_vars_number(out, "total_ns", time.total_ns);
+        fcsl_vars_number(out, "mean_ns", time.mean_ns);
+        fcsl_vars_number(out, "p50_ns", time.p50_ns);
+        fcsl_vars_number(out, "p99_ns", time.p99_ns);
+        fcsl_vars_number(out, "max_ns", time.max_ns);
+        fcsl_vars_end(out);
+    }
+    fcsl_vars_end(out);
+}
+
 /* The block that serves the verdicts of the host's run; block_count without. */
 static uint32_t verdict_block(const protocol_t *protocol)
 {
@@ -187,6 +207,9 @@ int fcsl_handle_stats(request_t *request)
         fcsl_vars_number(out, "overruns", overruns);
         put_fault_places(out, machine, data);
         fcsl_vars_lost_requests(out, machine, data);
+    }
+    if (protocol->host->run != NULL) {
+        fcsl_vars_times(out, protocol->host->run);
     }
     const uint32_t verdicts = verdict_block(protocol);
     if (verdicts < catalog->block_count) {

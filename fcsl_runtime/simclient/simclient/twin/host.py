@@ -20,6 +20,7 @@ from ..hardware import Hardware
 from ..paths import Part, Selection, resolve
 
 if TYPE_CHECKING:
+    from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .black_box import BlackBox
     from .profile import Samples
@@ -145,6 +146,10 @@ class TwinHost(ABC):
     @abstractmethod
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         """One sample of a sensor channel for the next tick."""
+
+    def _times(self) -> dict[str, InstanceTime]:
+        """How long instances, and steps, took so far; empty if the machine is not measured."""
+        raise TwinError(f"{type(self).__name__} does not read the times of instances")
 
     def _verdicts(self) -> list[Verdict]:
         """On the machine's requirements."""

@@ -31,6 +31,7 @@ from .process_tap import ProcessTap
 from .twin import Twin
 
 if TYPE_CHECKING:
+    from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .profile import Samples
 
@@ -138,6 +139,11 @@ class ProcessTwin(Twin):
         return self._ticks_skipped
 
     # ---- primitives -------------------------------------------------------------------------------------------------
+
+    def _times(self) -> dict[str, InstanceTime]:
+        from ..instance_times import of_stats
+
+        return of_stats(self._request("stats").get("times", {}))
 
     def _verdicts(self) -> list[Verdict]:
         """As the program's `stats` has them: without the values of a violation."""

@@ -32,6 +32,7 @@ from .faults import TwinFaults
 
 if TYPE_CHECKING:
     from ..bag import Bag
+    from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .snapshot import Snapshot
     from .trace import Trace
@@ -227,6 +228,17 @@ class Twin(TwinFaults):
         path = "machine.lost_requests"
         counts = self.get_value(path) if path in self.machine.fields else []
         return self.machine.named_lost_requests(counts) if counts else {}
+
+    def instance_times(self) -> dict[str, InstanceTime]:
+        """How long each instance took so far, and under "machine" the whole step (instance_times.py). Raises TwinError if the
+        machine was not built to be measured: FCSL_TIMES=1 in the environment, or `fcsl build --times`.
+        """
+        from ..instance_times import NOT_MEASURED
+
+        found = self._times()
+        if not found:
+            raise TwinError(NOT_MEASURED.format(self.machine.name))
+        return found
 
     @property
     def requirements(self) -> dict[str, Verdict]:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 import time
 from collections import deque
@@ -13,6 +12,7 @@ from typing import Any, Protocol
 
 from .answers import units_of
 from .client import VarClient
+from .screen import Screen
 from .show import flat, jsonable, show_value, with_unit
 from .subscription import Sample, Subscription
 from .terminal_plot import draw_panel
@@ -20,9 +20,7 @@ from .wire import VarError
 
 #: Shortest time between two redraws, in s.
 _PERIOD_S = 0.05
-_HIDE_CURSOR, _SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
 _TITLE_ROWS = 3  # of a panel: its title, its axis, its ticks
-_FALLBACK_SIZE = (80, 24)
 _CURVES_MAX = 64
 
 
@@ -67,8 +65,7 @@ def plot(client: VarClient, paths: Sequence[str], every: int, ticks: int | None,
             return
         for sample in samples:
             curves.take(sample)
-        width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
-        print("\n".join(curves.lines(width, height - 1)))
+        print("\n".join(curves.lines(*Screen.size())))
 
 
 def _fields(client: VarClient, paths: Sequence[str]) -> list[tuple[str, Any]]:
@@ -92,31 +89,14 @@ def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterato
 
 def _show_live(display: Display, subscription: Subscription, samples: Iterator[Sample]) -> None:
     """Redraws with all samples received since the last drawing; leaves the last drawing on the screen."""
-    drawn, due = 0, 0.0
-    sys.stdout.write(_HIDE_CURSOR)
-    try:
+    due = 0.0
+    with Screen() as screen:
         for sample in samples:
             display.take(sample)
             if subscription.waiting() == 0 and time.monotonic() >= due:
-                drawn = _draw(display, drawn)
+                screen.draw(display.lines(*screen.size()))
                 due = time.monotonic() + _PERIOD_S
-        _draw(display, drawn)
-    finally:
-        sys.stdout.write(_SHOW_CURSOR)
-        sys.stdout.flush()
-
-
-def _draw(display: Display, drawn: int) -> int:
-    """Draws over the last `drawn` lines; returns the number of lines drawn."""
-    width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
-    lines, room = display.lines(width, height - 1), max(1, height - 1)
-    if len(lines) > room:
-        lines[room - 1 :] = [f"… {len(lines) - room + 1} lines more: no room"]
-    lines = [line if len(line) <= width else line[: width - 1] + "…" for line in lines]
-    back = f"\x1b[{drawn}A\r" if drawn else ""
-    sys.stdout.write(back + "".join(f"{line}\x1b[K\n" for line in lines) + "\x1b[J")
-    sys.stdout.flush()
-    return len(lines)
+        screen.draw(display.lines(*screen.size()))
 
 
 class _Table:
