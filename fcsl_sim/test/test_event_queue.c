@@ -9,7 +9,7 @@
 
 enum { EVENTS = 500 };
 
-static int is_before(const fcsl_event_t *a, const fcsl_event_t *b)
+static int is_before(const fcsl_queued_event_t *a, const fcsl_queued_event_t *b)
 {
     return a->time_ns != b->time_ns     ? a->time_ns < b->time_ns
            : a->priority != b->priority ? a->priority < b->priority
@@ -17,9 +17,9 @@ static int is_before(const fcsl_event_t *a, const fcsl_event_t *b)
 }
 
 /* Few distinct times and priorities, so that ties are frequent. */
-static fcsl_event_t random_event(uint64_t *random, uint32_t index)
+static fcsl_queued_event_t random_event(uint64_t *random, uint32_t index)
 {
-    return (fcsl_event_t){.time_ns = (int64_t)(next_random(random) % 7) - 3,
+    return (fcsl_queued_event_t){.time_ns = (int64_t)(next_random(random) % 7) - 3,
                           .priority = (uint32_t)(next_random(random) % 3),
                           .index = index};
 }
@@ -34,9 +34,9 @@ static void pops_in_order(void)
             CHECK(fcsl_event_queue_push(&queue, random_event(&random, i)) == 0);
         }
         uint8_t seen[EVENTS] = {0};
-        fcsl_event_t last = {0};
+        fcsl_queued_event_t last = {0};
         for (uint32_t i = 0; i < EVENTS; i++) {
-            fcsl_event_t event;
+            fcsl_queued_event_t event;
             CHECK(fcsl_event_queue_pop(&queue, &event) == 0);
             CHECK(i == 0 || is_before(&last, &event));
             CHECK(!seen[event.index]);
@@ -58,7 +58,7 @@ static void pops_the_first(void)
             CHECK(fcsl_event_queue_push(&queue, random_event(&random, step)) == 0);
             continue;
         }
-        fcsl_event_t event;
+        fcsl_queued_event_t event;
         CHECK(fcsl_event_queue_pop(&queue, &event) == 0);
         for (uint32_t i = 0; i < queue.count; i++) {
             CHECK(is_before(&event, &queue.events[i]));
@@ -70,7 +70,7 @@ static void pops_the_first(void)
 static void is_bounded(void)
 {
     fcsl_event_queue_t queue;
-    fcsl_event_t event = {.time_ns = 5};
+    fcsl_queued_event_t event = {.time_ns = 5};
     CHECK(fcsl_event_queue_init(&queue, 2) == 0);
     CHECK(fcsl_event_queue_pop(&queue, &event) == -1);
     CHECK(fcsl_event_queue_push(&queue, event) == 0);

@@ -23,7 +23,7 @@ void fcsl_event_queue_free(fcsl_event_queue_t *queue)
     *queue = (fcsl_event_queue_t){0};
 }
 
-static int comes_first(const fcsl_event_t *a, const fcsl_event_t *b)
+static int comes_first(const fcsl_queued_event_t *a, const fcsl_queued_event_t *b)
 {
     if (a->time_ns != b->time_ns) {
         return a->time_ns < b->time_ns;
@@ -34,7 +34,7 @@ static int comes_first(const fcsl_event_t *a, const fcsl_event_t *b)
     return a->sequence < b->sequence;
 }
 
-int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event)
+int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_queued_event_t event)
 {
     if (queue->count >= queue->capacity) {
         return -1;
@@ -53,7 +53,7 @@ int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event)
     return 0;
 }
 
-int fcsl_event_queue_peek(const fcsl_event_queue_t *queue, fcsl_event_t *event)
+int fcsl_event_queue_peek(const fcsl_event_queue_t *queue, fcsl_queued_event_t *event)
 {
     if (queue->count == 0) {
         return -1;
@@ -62,13 +62,13 @@ int fcsl_event_queue_peek(const fcsl_event_queue_t *queue, fcsl_event_t *event)
     return 0;
 }
 
-int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_event_t *event)
+int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_queued_event_t *event)
 {
     if (queue->count == 0) {
         return -1;
     }
     *event = queue->events[0];
-    const fcsl_event_t last = queue->events[--queue->count];
+    const fcsl_queued_event_t last = queue->events[--queue->count];
     uint32_t hole = 0;
     for (;;) { /* at most log2(capacity) levels */
         uint32_t child = 2 * hole + 1;

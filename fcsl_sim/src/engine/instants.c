@@ -22,20 +22,20 @@ static int64_t tick_ns(const fcsl_sim_t *sim, uint64_t tick)
 
 int fcsl_sim_schedule_tick(fcsl_sim_t *sim, uint64_t tick)
 {
-    const fcsl_event_t event = {.time_ns = tick_ns(sim, tick), .kind = EVENT_TICK, .priority = PRIORITY_TICK};
+    const fcsl_queued_event_t event = {.time_ns = tick_ns(sim, tick), .kind = EVENT_TICK, .priority = PRIORITY_TICK};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
 static int schedule_update(fcsl_sim_t *sim, uint32_t index)
 {
-    const fcsl_event_t event = {
+    const fcsl_queued_event_t event = {
         .time_ns = sim->plant.instances[index].next_update_ns, .kind = EVENT_UPDATE, .index = index, .priority = index};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
 static int schedule_companion(fcsl_sim_t *sim, uint32_t index)
 {
-    const fcsl_event_t event = {.time_ns = sim->companions[index].next_tick_ns,
+    const fcsl_queued_event_t event = {.time_ns = sim->companions[index].next_tick_ns,
                                 .kind = EVENT_COMPANION,
                                 .index = index,
                                 .priority = PRIORITY_COMPANION};
@@ -225,7 +225,7 @@ static int tick_companions(fcsl_sim_t *sim, fcsl_error_t *error)
 
 int fcsl_sim_next_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
 {
-    fcsl_event_t event;
+    fcsl_queued_event_t event;
     if (fcsl_event_queue_peek(&sim->queue, &event)) {
         return fcsl_fail(error, "the event queue ran empty");
     }
