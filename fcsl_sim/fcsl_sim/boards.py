@@ -93,4 +93,6 @@ def emulated(name: str, program: Path, address: str) -> Iterator[Emulator]:
         yield Emulator(process)
     finally:
         process.kill()
-        process.communicate()
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()

@@ -122,9 +122,15 @@ def _fly_there(
         board = open_.enter_context(emulated(*emulator)) if emulator else None
         _await(sim, timeout_ms, board)
         begun = time.perf_counter()
-        while sim.status == "running" and flight.truth == here.truth[: len(flight.truth)]:
-            sim.run(1)
+        same = True
+        while sim.status == "running" and same:
+            try:
+                sim.run(1)
+            except SimError as error:
+                problem = board.problem() if board is not None else ""
+                raise SimError(f"{error}; {problem}" if problem else str(error)) from None
             flight.truth.append(zlib.crc32(sim.truth_values()))
+            same = flight.truth[-1:] == here.truth[len(flight.truth) - 1 : len(flight.truth)]
         flight.seconds = time.perf_counter() - begun
         sim.close()
         if board is not None:
@@ -136,8 +142,9 @@ def _await(sim: Simulation, timeout_ms: int, board: Emulator | None) -> None:
     """In short waits, so that a signal ends them."""
     deadline = time.monotonic() + timeout_ms / 1e3
     while not sim.accept(max(0, min(_ACCEPT_MS, round(1e3 * (deadline - time.monotonic()))))):
-        if board is not None and board.problem():
-            raise SimError(board.problem())
+        problem = board.problem() if board is not None else ""
+        if problem:
+            raise SimError(problem)
         if time.monotonic() >= deadline:
             raise SimError(f"{sim.problem} within {timeout_ms / 1e3:g} s")
 

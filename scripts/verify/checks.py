@@ -105,6 +105,7 @@ CHECKS = (
     script("EVA: no run-time error in the codec, any bytes, with seeded defects", "codec"),
     script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
+    python("firmware: the steps of its page on a Cortex-M7", "-m", "pytest", "-q", "test/test_firmware_page.py"),
     script("real kernel drivers: sensors, outputs and flights in user-mode Linux", "hardware"),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )

@@ -22,7 +22,7 @@ _KIND = "fcsl firmware"
 def build(options: argparse.Namespace, folder: Path | None, name: str, instances: list[str] | None) -> int:
     """Builds `lib<name>.a` in `folder`, or by default in one that is named after the processor."""
     for option in ("c_only", "depfile", "times"):
-        if getattr(options, option):
+        if getattr(options, option, False):
             raise UsageError(f"--processor does not go with --{option.replace('_', '-')}; remove one of them")
     if options.report:
         raise UsageError(
