@@ -58,6 +58,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     run = _add(commands, "run", "run a simulation to its end")
     run.add_argument("config", help=_CONFIG)
     _add_flight(run)
+    _add_parameters(run)
     _add_run(run)
     _add_plot(_add(commands, "plot", "draw a simulation"))
     _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
@@ -93,6 +94,13 @@ def _add_changes(command: argparse.ArgumentParser) -> None:
     command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     help_event = 'adds an event: "14.0 altimeter.parameters.dropout=true", at 14 s (repeatable)'
     command.add_argument("--event", action="append", default=[], metavar="EVENT", dest="events", help=help_event)
+
+
+def _add_parameters(command: argparse.ArgumentParser) -> None:
+    help_parameters = (
+        "parameter file for the controllers (docs/reference/variables.md), instead of their compiled values"
+    )
+    command.add_argument("--parameters", metavar="FILE", help=help_parameters)
 
 
 def _add_run(command: argparse.ArgumentParser) -> None:
@@ -161,6 +169,7 @@ def _add_plot(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
     command.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
     _add_flight(command)
+    _add_parameters(command)
 
 
 def _add_campaign(command: argparse.ArgumentParser) -> None:
@@ -215,6 +224,7 @@ def _add_response(command: argparse.ArgumentParser) -> None:
         "--at", type=_seconds, metavar="SECONDS", help="fly until then first (s); default: the beginning"
     )
     _add_changes(command)
+    _add_parameters(command)
     help_from = "the lowest frequency (default: 1 rad/s)"
     command.add_argument("--from", type=_positive, default=1.0, metavar="RAD_S", dest="low", help=help_from)
     help_to = "the highest one (default: 0.9 of half of the ticks' frequency)"

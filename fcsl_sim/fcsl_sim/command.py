@@ -96,7 +96,12 @@ def _interrupted(options: argparse.Namespace, number: signal.Signals) -> int:
 
 def _load(options: argparse.Namespace) -> SimConfig:
     config = load(
-        options.config, seed=options.seed, duration_s=options.duration, sets=options.sets, events=options.events
+        options.config,
+        seed=options.seed,
+        duration_s=options.duration,
+        sets=options.sets,
+        events=options.events,
+        parameters=getattr(options, "parameters", None),
     )
     for warning in config.warnings:
         print(warning, file=sys.stderr)
@@ -204,6 +209,12 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--timeout` needs `--external` or `--pil`: it limits the wait for the controller")
     if options.timeout is not None and external is not None and external.endswith(FREE_RUNNING):
         raise SimError("`--timeout` does not go with `,free-running`: nobody waits for the controller")
+    if options.parameters is not None and external is not None:
+        raise SimError(
+            "`--parameters` are of controllers in this process; give them to the external one: fcsl-fc --parameters"
+        )
+    if options.parameters is not None and options.restore is not None:
+        raise SimError("`--parameters` does not go with `--restore`: the checkpoint has the parameters of its flight")
     timeout_ms = TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000)))
     if options.pil is not None:
         return _fly_on_processor(options, timeout_ms)

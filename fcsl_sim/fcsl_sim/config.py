@@ -37,6 +37,7 @@ from fcsl_compiler.api.sections import Signals, read_views
 from fcsl_compiler.api.types import Type, count_of, scalar_of
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
+from simclient.parameters import Given, read_parameters
 from simclient.run import open_run
 
 from . import plan
@@ -146,13 +147,15 @@ def load(
     events: Sequence[str] = (),
     machine: tuple[Path, str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    parameters: Given | None = None,
 ) -> SimConfig:
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
     seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside
     the file's: `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which
-    replaces the file's. backend: language (BACKENDS) into which the file's machines are compiled. Raises
+    replaces the file's. backend: language (BACKENDS) into which the file's machines are compiled. parameters: with which
+    the controllers begin. Raises
     DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
     """
     try:
@@ -162,6 +165,10 @@ def load(
         raise SimError(f"{path}: {error}") from None
     except SourceError as error:
         raise SimError(f"{path}: {error}") from None
+    try:
+        values = read_parameters(parameters)
+    except TwinError as error:
+        raise SimError(str(error)) from None
     sink = DiagnosticSink()
     root = read_extended(source, sink)
     sink.raise_if_failed()
@@ -170,7 +177,7 @@ def load(
     root = with_events(root, events, sink)
     if machine is None:
         _require_compiler()
-    arguments = {"sets": sets, "events": events, "machine": machine, "backend": backend}
+    arguments = {"sets": sets, "events": events, "machine": machine, "backend": backend, "parameters": values}
     return _Loader(file, sink, arguments).load(root, seed, duration_s)
 
 
@@ -295,7 +302,7 @@ class _Loader:
         ]
         return SimConfig(
             self.file,
-            Plan(tuple(lines)),
+            Plan(tuple(lines), self.arguments["parameters"]),
             {name: table for name, table in tables.items() if table},
             controller,
             lead.machine,

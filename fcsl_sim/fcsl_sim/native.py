@@ -20,6 +20,7 @@ from simclient.c_run import VERDICTS, CError
 from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.library import bind
+from simclient.parameters import CParameters
 from simclient.paths import resolve
 from simclient.requirements import Verdict, read_verdicts, read_violations
 from simclient.ros.composer import Composer
@@ -81,7 +82,7 @@ class _Part(ctypes.Structure):
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here. The simulator brings those of libfcsl_run.so.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
-    "fcsl_sim_open": (ptr, [c_char_p, c_size_t, _ERROR]),
+    "fcsl_sim_open": (ptr, [c_char_p, c_size_t, POINTER(CParameters), _ERROR]),
     "fcsl_sim_close": (c_int, [ptr, _ERROR]),
     "fcsl_sim_machine": (POINTER(CMachine), [ptr]),
     "fcsl_sim_tick": (c_uint64, [ptr]),
@@ -244,7 +245,8 @@ class Simulation:
         self._lib = simulator_library()
         self._error = CError()
         data = plan.text.encode()
-        self._handle = self._lib.fcsl_sim_open(data, len(data), byref(self._error))
+        parameters = None if plan.parameters is None else plan.parameters.to_c()
+        self._handle = self._lib.fcsl_sim_open(data, len(data), parameters, byref(self._error))
         if not self._handle:
             raise SimError(_text(self._error))
         self.machine: Machine = read_machine(self._lib.fcsl_sim_machine(self._handle))

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from simclient.parameters import Parameters
 
 from .errors import SimError
 
@@ -56,6 +58,8 @@ class Plan:
     """What the native simulator opens: its statements, in the order in which it reads them."""
 
     statements: tuple[Statement, ...]
+    #: With which the controllers begin; None: the compiled ones.
+    parameters: Parameters | None = None
 
     @property
     def text(self) -> str:
@@ -78,7 +82,7 @@ class Plan:
             new = values.get(target_of(one)) if one.keyword == "set" else None
             return one if new is None else statement("set", *target_of(one), new)
 
-        return Plan(tuple(map(changed, self.statements)))
+        return replace(self, statements=tuple(map(changed, self.statements)))
 
 
 def target_of(one: Statement) -> Target:

@@ -22,7 +22,8 @@ from typing import Any, Self
 from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.descriptor import Field
 from simclient.errors import TwinError
-from simclient.machine_build import check_backend, find_config
+from simclient.machine_build import check_backend, find_config, find_parameters
+from simclient.parameters import Given, Parameters
 from simclient.twin.alg_twin import AlgTwin
 from simclient.twin.black_box import BlackBox
 from simclient.twin.overwritten import warn
@@ -60,29 +61,40 @@ class SimTwin(AlgTwin):
         sets: Sequence[str] = (),
         events: Sequence[str] = (),
         duration: float | Fraction | None = None,
+        parameters: Given | None = None,
     ) -> Self:
         """Checks a simulation file, compiles its models and machine (both cached) and opens it, paused at tick 0.
 
         `path` is relative to the working directory, or else to the caller's file, or package://PACKAGE/PATH. `seed` and
         `duration` (s) replace those of the file; `sets` replaces parameters of models, `events` adds events:
         ["altimeter.parameters.sigma=0.8"], ["14.0 altimeter.parameters.dropout=true"]. `backend` ("c" or "nim") is the
-        language into which its machines are compiled; the flight is the same. Raises TwinError, with the diagnostics if
+        language into which its machines are compiled; the flight is the same. `parameters`: with which the controllers
+        begin, as in AlgTwin. Raises TwinError, with the diagnostics if
         the file is wrong.
         """
         if target != "simulation":
             raise TwinError(f"target={target!r}: the machine of a simulation is compiled for `simulation` alone")
-        found: str | Path = path
+        found, caller = path, sys._getframe(1).f_code.co_filename
         if not str(path).startswith("package://"):
-            found = find_config(path, sys._getframe(1).f_code.co_filename, "simulation")
-        return cls(SimRun(_load(found, seed, sets, events, duration, backend)))
+            found = find_config(path, caller, "simulation")
+        values = find_parameters(parameters, caller)
+        return cls(SimRun(_load(found, seed, sets, events, duration, backend, values)))
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
-        return cls(SimRun(_load(config, None, (), (), None, backend)))
+    def _open_config(
+        cls, config: Path, target: str, instances: Sequence[str] | None, backend: str, parameters: Parameters | None
+    ) -> Self:
+        return cls(SimRun(_load(config, None, (), (), None, backend, parameters)))
 
     @classmethod
     def from_instances(
-        cls, path: str | Path, instances: Sequence[str], target: str = "simulation", backend: str = "c"
+        cls,
+        path: str | Path,
+        instances: Sequence[str],
+        target: str = "simulation",
+        backend: str = "c",
+        *,
+        parameters: Given | None = None,
     ) -> Self:
         """Always raises TwinError: a simulation is flown whole."""
         raise TwinError(
@@ -91,7 +103,7 @@ class SimTwin(AlgTwin):
         )
 
     @classmethod
-    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
+    def from_library(cls, path: str | Path, machine: str | None = None, *, parameters: Given | None = None) -> Self:
         """Always raises TwinError: a library has no plant."""
         raise TwinError(f"{path}: SimTwin opens a simulation file (*.sim.json); a library alone is for AlgTwin")
 
@@ -130,6 +142,7 @@ def _load(
     events: Sequence[str],
     duration: float | Fraction | None,
     backend: str,
+    parameters: Parameters | None,
 ) -> SimConfig:
     """Raises TwinError."""
     check_backend(backend)
@@ -139,7 +152,15 @@ def _load(
     if seed is not None and (type(seed) is not int or not 0 <= seed < 2**64):
         raise TwinError(f"seed={seed!r}: an integer from 0 to 2**64 - 1 wanted")
     try:
-        return load(path, seed=seed, duration_s=_seconds(duration), sets=sets, events=events, backend=backend)
+        return load(
+            path,
+            seed=seed,
+            duration_s=_seconds(duration),
+            sets=sets,
+            events=events,
+            backend=backend,
+            parameters=parameters,
+        )
     except (SimError, DiagnosticError) as error:
         raise TwinError(str(error)) from None
 

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from ctypes import Structure, c_char_p, c_int, c_size_t
+from ctypes import POINTER, Structure, c_char_p, c_int, c_size_t
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Union
 
 from .errors import TwinError
 
 #: What may be given: a path, or values by name, "pilot.gain"; structs and arrays as mappings and lists.
-Given = str | Path | Mapping[str, Any]
+Given = Union[str, Path, Mapping[str, Any], "Parameters"]
 
 
 class CParameters(Structure):
@@ -28,7 +28,7 @@ class CParameters(Structure):
         ("size", c_size_t),
         ("name", c_char_p),
         ("name_space", c_char_p),
-        ("optional", c_int),
+        ("used", POINTER(c_int)),
     ]
 
 
@@ -39,17 +39,16 @@ class Parameters:
     text: bytes
     name: str
 
-    def to_c(self, name_space: str = "", optional: bool = False) -> CParameters:
-        """`optional`: there may be no section for the machine."""
+    def to_c(self, name_space: str = "") -> CParameters:
         name = self.name.encode("utf-8", "surrogateescape")
-        return CParameters(self.text, len(self.text), name, name_space.encode(), optional)
+        return CParameters(self.text, len(self.text), name, name_space.encode(), None)
 
 
 def read_parameters(given: Given | None) -> Parameters | None:
     """None where nothing is given. Raises TwinError for a file that cannot be read; what it says is checked when a machine is
     opened with it."""
-    if given is None:
-        return None
+    if given is None or isinstance(given, Parameters):
+        return given
     if isinstance(given, Mapping):
         return Parameters(_text({"/**": {"ros__parameters": dict(given)}}).encode(), "parameters")
     if not isinstance(given, str | Path):

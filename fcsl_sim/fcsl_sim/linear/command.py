@@ -56,7 +56,9 @@ def run_linearise(options: Any) -> int:
 
 def run_response(options: Any) -> int:
     """Exit status: 0, or 1 where nothing was measured. Raises SimError or DiagnosticError."""
-    config = load(options.config, seed=options.seed, sets=options.sets, events=options.events)
+    config = load(
+        options.config, seed=options.seed, sets=options.sets, events=options.events, parameters=options.parameters
+    )
     _warn(config)
     high = options.high or _OF_NYQUIST * math.pi * config.machine.tick_hz
     if high >= math.pi * config.machine.tick_hz:

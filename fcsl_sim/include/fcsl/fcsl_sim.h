@@ -27,8 +27,9 @@ extern "C" {
 
 typedef struct fcsl_sim fcsl_sim_t;
 
-/* Parses the plan, loads models and machine, initialises everything. Null on failure: error names the problem and the line. */
-fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error);
+/* Parses the plan, loads models and machine, initialises everything. `parameters` (null: none): of the controllers, for one of which
+ * it has a section at least; `used` of it is not. Null on failure: error names the problem and the line. */
+fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, const fcsl_parameters_t *parameters, fcsl_error_t *error);
 /* Stops recording and unloads. */
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error);
 

@@ -11,10 +11,11 @@
 #include "base/clock.h"
 #include "fcsl/fcsl_error.h"
 
-int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan, fcsl_error_t *error)
+int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan,
+                        const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     companion->name = plan->name;
-    companion->run = fcsl_run_open(plan->library, plan->machine, NULL, error);
+    companion->run = fcsl_run_open(plan->library, plan->machine, parameters, error);
     if (!companion->run) {
         return -1;
     }

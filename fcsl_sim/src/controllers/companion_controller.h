@@ -41,7 +41,8 @@ typedef struct {
 } fcsl_companion_t;
 
 /* Loads the machine of a companion. Returns 0, or -1. */
-int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan, fcsl_error_t *error);
+int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan,
+                        const fcsl_parameters_t *parameters, fcsl_error_t *error);
 /* Once it has its sensors: attaches its channels. */
 int fcsl_companion_start(fcsl_companion_t *companion, fcsl_error_t *error);
 int fcsl_companion_close(fcsl_companion_t *companion, fcsl_error_t *error);

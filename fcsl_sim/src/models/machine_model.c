@@ -99,9 +99,13 @@ const fcsl_model_t *fcsl_machine_model_of(const fcsl_machine_model_t *model)
     return &model->model;
 }
 
-int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error)
+void fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self)
 {
     model->machine->init(self);
+}
+
+int fcsl_machine_model_start(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error)
+{
     return model->machine->start(self) == 0 ? 0 : fcsl_fail(error, "`start` of `%s` faults", model->machine->name);
 }
 

@@ -15,8 +15,10 @@ typedef struct fcsl_machine_model fcsl_machine_model_t;
 fcsl_machine_model_t *fcsl_machine_model_open(const char *library, const char *machine, fcsl_error_t *error);
 void fcsl_machine_model_close(fcsl_machine_model_t *model);
 const fcsl_model_t *fcsl_machine_model_of(const fcsl_machine_model_t *model);
-/* Binds the parameters of the machine JSON and runs `start`, in the struct of an instance. Returns 0, or -1: `start` faults. */
-int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error);
+/* Binds the parameters of the machine JSON in the struct of an instance. */
+void fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self);
+/* Runs `start`, once the instance has its parameters. Returns 0, or -1: it faults. */
+int fcsl_machine_model_start(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error);
 
 /* Whether a struct from a checkpoint is one of the machine's: no state, no enumeration has an impossible value. */
 int fcsl_machine_model_takes(const fcsl_machine_model_t *model, const void *self);

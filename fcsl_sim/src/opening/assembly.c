@@ -24,10 +24,10 @@
 
 /* ---- machine, models, instances ---------------------------------------------------------------------------------------- */
 
-static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
+static int build_machine(fcsl_sim_t *sim, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
-    sim->run = fcsl_run_open(plan->machine.library, plan->machine.name, NULL, error);
+    sim->run = fcsl_run_open(plan->machine.library, plan->machine.name, parameters, error);
     if (!sim->run) {
         return -1;
     }
@@ -54,7 +54,7 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
-static int build_companions(fcsl_sim_t *sim, fcsl_error_t *error)
+static int build_companions(fcsl_sim_t *sim, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
     sim->companions = calloc(plan->companion_count + 1u, sizeof *sim->companions);
@@ -63,11 +63,25 @@ static int build_companions(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     sim->companion_count = plan->companion_count;
     for (uint32_t i = 0; i < plan->companion_count; i++) {
-        if (fcsl_companion_open(&sim->companions[i], &plan->companions[i], error)) {
+        if (fcsl_companion_open(&sim->companions[i], &plan->companions[i], parameters, error)) {
             return -1;
         }
     }
     return 0;
+}
+
+/* Each has the values of its own sections. */
+static int build_controllers(fcsl_sim_t *sim, const fcsl_parameters_t *given, fcsl_error_t *error)
+{
+    int used = 0;
+    fcsl_parameters_t parameters = given ? *given : (fcsl_parameters_t){0};
+    parameters.used = sim->plan.companion_count > 0 ? &used : NULL;
+    if (build_machine(sim, given ? &parameters : NULL, error) ||
+        build_companions(sim, given ? &parameters : NULL, error)) {
+        return -1;
+    }
+    return given && parameters.used && !used ? fcsl_fail(error, "%.200s: no section is for a controller", given->name)
+                                             : 0;
 }
 
 static int build_models(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -126,7 +140,10 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
         return fcsl_fail(error, "no memory for instance `%s`", from->name);
     }
     fcsl_noise_seed(&instance->noise, plan->seed, from->name);
-    return instance->machine ? fcsl_machine_model_init(instance->machine, instance->data, error) : 0;
+    if (instance->machine) {
+        fcsl_machine_model_init(instance->machine, instance->data);
+    }
+    return 0;
 }
 
 static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -288,10 +305,9 @@ static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
                         : 0;
 }
 
-int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_assembly_build(fcsl_sim_t *sim, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
-    if (build_machine(sim, error) || build_companions(sim, error) || build_models(sim, error) ||
-        build_instances(sim, error)) {
+    if (build_controllers(sim, parameters, error) || build_models(sim, error) || build_instances(sim, error)) {
         return -1;
     }
     if (build_writes(sim, error) || fcsl_sim_build_connections(sim, error) || fcsl_sim_build_groups(sim, error)) {

@@ -22,6 +22,9 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         fcsl_instance_state_t *instance = &sim->plant.instances[i];
         const fcsl_model_context_t context = fcsl_plant_context(&sim->plant, i, 0);
         fcsl_plant_enter(&sim->plant, i, FCSL_IN_INIT);
+        if (instance->machine && fcsl_machine_model_start(instance->machine, instance->data, error)) {
+            return -1;
+        }
         const char *wrong = instance->model->init ? instance->model->init(instance->data, &context) : NULL;
         if (fcsl_sim_check_fp_mode(instance->name, error)) {
             return -1;
@@ -76,7 +79,7 @@ static int attach(fcsl_sim_t *sim, fcsl_error_t *error)
     return fcsl_run_attach(sim->run, error);
 }
 
-fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
+fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, const fcsl_parameters_t *parameters, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = calloc(1, sizeof *sim);
     if (!sim) {
@@ -84,8 +87,8 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         return NULL;
     }
     fcsl_sim_is_open(&sim->plant, 1);
-    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || start_models(sim, error) ||
-        fill_queue(sim, error) || attach(sim, error)) {
+    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, parameters, error) ||
+        start_models(sim, error) || fill_queue(sim, error) || attach(sim, error)) {
         (void)fcsl_sim_close(sim, NULL);
         return NULL;
     }

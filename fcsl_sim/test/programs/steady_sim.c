@@ -30,7 +30,7 @@ int main(int argc, char **argv)
     fcsl_error_t error;
     FILE *file = argc == 2 ? fopen(argv[1], "rb") : NULL;
     const size_t size = file ? fread(plan, 1, sizeof plan, file) : 0;
-    fcsl_sim_t *sim = size > 0 ? fcsl_sim_open(plan, size, &error) : NULL;
+    fcsl_sim_t *sim = size > 0 ? fcsl_sim_open(plan, size, NULL, &error) : NULL;
     if (!sim || fcsl_sim_run(sim, FIRST_TICKS, &error) < 0) {
         (void)fprintf(stderr, "%s\n", error.text);
         return 1;

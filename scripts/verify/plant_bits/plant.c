@@ -66,7 +66,7 @@ static void put(const fcsl_sim_t *sim, int names)
 static int fly(size_t size, int names)
 {
     fcsl_error_t error = {{0}};
-    fcsl_sim_t *sim = fcsl_sim_open(plan, size, &error);
+    fcsl_sim_t *sim = fcsl_sim_open(plan, size, NULL, &error);
     if (sim == NULL) {
         return fail(error.text);
     }

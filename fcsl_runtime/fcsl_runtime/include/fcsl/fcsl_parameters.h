@@ -22,7 +22,7 @@ typedef struct {
     size_t size;
     const char *name; /* what errors call it: its path */
     const char *name_space; /* of the machine's node, "" for none: `/<name space>/<machine>` is what sections are for */
-    int optional; /* non-zero: it may have no section for this machine */
+    int *used; /* null: a file without a section for this machine is refused; else set to 1 where it has one */
 } fcsl_parameters_t;
 
 /* Reads a file whole into memory that the caller frees; null with `error`. */

@@ -276,7 +276,9 @@ static int read_all(reading_t *r, const fcsl_parameters_t *parameters, fcsl_erro
                          "`ros__parameters:`, and below it the parameters",
                          parameters->name);
     }
-    if (!r->is_meant && r->other[0] != '\0' && !parameters->optional) {
+    if (parameters->used != NULL) {
+        *parameters->used |= r->is_meant;
+    } else if (!r->is_meant && r->other[0] != '\0') {
         return fcsl_fail(error,
                          "%.120s: no section is for `%.120s`; the first is for `%.120s`, `/**:` is for every node",
                          parameters->name, r->node, r->other);

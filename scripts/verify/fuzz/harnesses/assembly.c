@@ -285,13 +285,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     plan->bytes = (bytes_t){data, size};
     say_all(plan);
     fcsl_error_t error = {{0}};
-    fcsl_sim_t *sim = fcsl_sim_open(plan->text, plan->used, &error);
+    fcsl_sim_t *sim = fcsl_sim_open(plan->text, plan->used, NULL, &error);
     FUZZ_CHECK((sim == NULL) == (error.text[0] != '\0'));
     if (getenv("FUZZ_SHOW") != NULL) {
         (void)fprintf(stderr, "%s%s\n", plan->text, error.text);
     }
     if (sim != NULL) {
-        fcsl_sim_t *other = fcsl_sim_open(plan->text, plan->used, &error);
+        fcsl_sim_t *other = fcsl_sim_open(plan->text, plan->used, NULL, &error);
         FUZZ_CHECK(other != NULL);
         fly(sim, other);
         FUZZ_CHECK(fcsl_sim_close(other, &error) == 0);

@@ -306,7 +306,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     tables = t;
     const size_t length = write_plan(&bytes, &t->model, text);
-    fcsl_sim_t *sim = fcsl_sim_open(text, length, &error);
+    fcsl_sim_t *sim = fcsl_sim_open(text, length, NULL, &error);
     FUZZ_CHECK((sim == NULL) == (error.text[0] != '\0'));
     if (getenv("FUZZ_SHOW") != NULL) {
         (void)fprintf(stderr, "%s\n", error.text);

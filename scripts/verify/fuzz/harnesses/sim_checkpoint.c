@@ -113,7 +113,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fcsl_error_t error = {{0}};
     const char *plan = plans[take_number(&bytes, 1) % (sizeof plans / sizeof *plans)];
     const uint64_t before = take_number(&bytes, 1) % 6u;
-    fcsl_sim_t *sim = fcsl_sim_open(plan, strlen(plan), &error);
+    fcsl_sim_t *sim = fcsl_sim_open(plan, strlen(plan), NULL, &error);
     if (sim == NULL) {
         (void)fprintf(stderr, "%s\n", error.text);
         FUZZ_CHECK(!"the plans are good");

@@ -68,7 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         free(plan);
         return 0;
     }
-    fcsl_sim_t *sim = fcsl_sim_open(plan, length, &error);
+    fcsl_sim_t *sim = fcsl_sim_open(plan, length, NULL, &error);
     free(plan);
     FUZZ_CHECK((sim == NULL) == (error.text[0] != '\0'));
     if (sim == NULL) {
