@@ -8,6 +8,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from fcsl_msgs.msg import (
     Checkpoint,
+    Event,
     FaultCounters,
     HostWrite,
     InstanceHealth,
@@ -36,8 +37,9 @@ def test_host_write_kinds() -> None:
         HostWrite.IMPURE,
         HostWrite.FAULT,
         HostWrite.HEALTH,
+        HostWrite.EVENTS,
     )
-    assert kinds == tuple(range(9))
+    assert kinds == tuple(range(10))
 
 
 def test_round_trip() -> None:
@@ -48,6 +50,7 @@ def test_round_trip() -> None:
         FaultCounters(tick=7, instance=["nav"], faults=[2**63], overruns=[1], fault_place=["nav.py:3:9: …"]),
         Checkpoint(tick=7, machine="lander_control", data=[1, 2, 3]),
         RequirementVerdicts(tick=7, requirement=["LND-7"], verdict=[1], holds=[False], values=["…"], violations=[3]),
+        Event(tick=7, severity=Event.WARNING, instance="nav", text="gate passed", values=["3", "0.5"], line=12),
         HostWrite(tick=7, kind=HostWrite.SET, path="sensors.outputs.pos_z", element=1, data=[0] * 8),
     ]
     for message in messages:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import Log
@@ -55,7 +56,20 @@ class NodeLogger:
         if self._console.fatal(message, **options):
             self._publish(LoggingSeverity.FATAL, message)
 
-    def _publish(self, severity: LoggingSeverity, message: str) -> None:
+    def report(self, level: int, message: str, file: str, function: str, line: int) -> None:
+        """A message of another place than the caller's. `level`: as rcl_interfaces/Log has it."""
+        console, severity = self._console, LoggingSeverity(level)
+        if severity >= LoggingSeverity.ERROR:
+            shown = console.error(message)
+        elif severity >= LoggingSeverity.WARN:  # rclpy wants one severity in each line
+            shown = console.warning(message)
+        else:
+            shown = console.info(message) if severity >= LoggingSeverity.INFO else console.debug(message)
+        if shown:
+            self._publish(severity, message, file=file, function=function, line=line)
+
+    def _publish(self, severity: LoggingSeverity, message: str, **place: Any) -> None:
         seconds, nanoseconds = divmod(time.time_ns(), 10**9)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
-        self.publisher.publish(Log(stamp=stamp, level=severity.value, name=self._console.name, msg=message))
+        log = Log(stamp=stamp, level=severity.value, name=self._console.name, msg=message, **place)
+        self.publisher.publish(log)

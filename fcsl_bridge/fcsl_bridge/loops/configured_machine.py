@@ -16,7 +16,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
-from fcsl_msgs.msg import TransitionEvent
+from fcsl_msgs.msg import Event, TransitionEvent
 from simclient.errors import TwinError
 from simclient.ros.publish_queue import RunTopics
 from simclient.run import open_run
@@ -69,7 +69,7 @@ class ConfiguredMachine:
         self.outputs = Outputs(node, self.run, self.queue_publisher, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
         self._stack.callback(StaticFrames(node, self.run.machine.views).close)
-        parts = (self.queue_publisher, self.messages, self._log_transition)
+        parts = (self.queue_publisher, self.messages, self._log_transition, self._log_event)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
         self._stack.callback(self.topics.close)
         self.parameters = MachineParameters(node, self.run, given)
@@ -123,6 +123,13 @@ class ConfiguredMachine:
         cause = f" ({event.request} by {event.instance})" if event.request else ""
         time_s = self.run.machine.time_ns(event.tick + 1) / 1e9
         self._node.get_logger().info(f"{time_s:.3f} s  {event.from_state} -> {event.to_state}{cause}")
+
+    def _log_event(self, message: bytes) -> None:
+        event = deserialize_message(message, Event)
+        text = " ".join((event.text, *event.values))
+        more = f" ({event.suppressed} before it suppressed)" if event.suppressed else ""
+        line = f"{self.run.machine.time_ns(event.tick) / 1e9:.3f} s  {event.instance}: {text}{more}"
+        self._node.get_logger().report(event.severity, line, event.file, event.instance, event.line)
 
     def start_over(self) -> None:
         """Begins a new run at tick 0, with the current parameters and a new bag."""

@@ -8,6 +8,7 @@ Topics below the node's namespace, all stamped with the time of the tick (time_n
     <machine>/transitions     fcsl_msgs/TransitionEvent   each one
     <machine>/health          fcsl_msgs/InstanceHealth    at the start and on change; transient local
     <machine>/faults          fcsl_msgs/FaultCounters     at the start and on change; transient local
+    <machine>/events          fcsl_msgs/Event             each one, of a machine whose algorithms report any
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from collections.abc import Callable
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from fcsl_msgs.msg import FaultCounters, InstanceHealth, MachineState, TransitionEvent
+from fcsl_msgs.msg import Event, FaultCounters, InstanceHealth, MachineState, TransitionEvent
 from simclient.ros.publish_queue import RunTopics
 from simclient.run import Run
 
@@ -36,7 +37,8 @@ _END_S = 5.0
 
 
 class MachineTopics:
-    """The publishers of a run's topics, each n-th tick with decimation n. `transition` gets the transitions' messages (CDR).
+    """The publishers of a run's topics, each n-th tick with decimation n. `transition` gets the transitions' messages (CDR), `event`
+    those of events.
 
     Raises BridgeError if a message type is missing or differs from the machine's.
     """
@@ -49,6 +51,7 @@ class MachineTopics:
         queue_publisher: QueuePublisher,
         messages: RunTopics,
         transition: Callable[[bytes], None],
+        event: Callable[[bytes], None],
     ):
         self._node = node
         machine = run.machine
@@ -60,6 +63,7 @@ class MachineTopics:
             for topic, kind in _LATCHED.items()
         }
         self._transitions = qos.publisher(node, TransitionEvent, f"{machine.name}/transitions", qos.EVENT)
+        self._events = [qos.publisher(node, Event, f"{machine.name}/events", qos.EVENT)] if machine.event_sites else []
         self._outputs = [
             (instance.index, qos.publisher(node, kind, f"{machine.name}/{instance.topic}", qos.STREAM))
             for instance, kind in kinds
@@ -69,12 +73,15 @@ class MachineTopics:
         for topic, publisher in self._latched.items():
             messages.add_tick_message(queue_publisher.add(publisher, self._keep if topic == "state" else None), topic)
         messages.add_tick_message(queue_publisher.add(self._transitions, transition), "transitions")
+        for publisher in self._events:
+            messages.add_events(queue_publisher.add(publisher, event))
         for index, publisher in self._outputs:
             messages.add_instance(queue_publisher.add(publisher), index, decimation)
 
     @property
     def all(self) -> list[Publisher]:
-        return [*(publisher for _, publisher in self._outputs), *self._latched.values(), self._transitions]
+        outputs = (publisher for _, publisher in self._outputs)
+        return [*outputs, *self._latched.values(), self._transitions, *self._events]
 
     def _keep(self, state: bytes) -> None:
         self._state = state

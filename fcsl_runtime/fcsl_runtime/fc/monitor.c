@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The monitor thread: signals, watchdog, log of faults, of a failed recording and of the HAL.
+ * The monitor thread: signals, watchdog, log of faults, of events, of a failed recording and of the HAL.
  */
 #define _GNU_SOURCE
 #include "monitor.h"
@@ -52,6 +52,7 @@ static void check(monitor_t *monitor, uint64_t now)
         log_error("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), monitor->loop->record_failure);
         atomic_store_explicit(&monitor->loop->record_logged, failed, memory_order_release);
     }
+    event_log_update(&monitor->events, monitor->loop->run);
     fault_log_update(&monitor->faults);
     guard_link_check(monitor->loop);
 }
@@ -87,6 +88,7 @@ static void *run_monitor(void *argument)
         const uint64_t now = fcsl_monotonic_ns();
         if (atomic_load(&monitor->loop_over)) {
             print_log(monitor); /* the last ticks */
+            event_log_update(&monitor->events, monitor->loop->run);
             fault_log_update(&monitor->faults);
             return NULL;
         }

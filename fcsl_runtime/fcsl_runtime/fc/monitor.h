@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The monitor thread runs beside the step thread. It takes the signals that end the run, finds steps that take too long, and
- * logs faults and a recording that failed.
+ * logs faults, events and a recording that failed.
  */
 #ifndef FC_MONITOR_H
 #define FC_MONITOR_H
@@ -9,6 +9,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include "event_log.h"
 #include "fault_log.h"
 #include "watchdog.h"
 
@@ -21,6 +22,7 @@ typedef struct {
     void *ctx;
 
     fault_log_t faults;
+    event_log_t events;
     sigset_t signals;
     atomic_int loop_over;
     pthread_t thread;

@@ -78,6 +78,15 @@ static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *d
     }
 }
 
+static void report_events(const fcsl_run_t *run)
+{
+    const fcsl_event_counts_t events = fcsl_run_event_counts(run);
+    if (fcsl_run_machine(run)->event_site_count > 0) {
+        log_info("events: %" PRIu64 " told, %" PRIu64 " suppressed, %" PRIu64 " without room", events.told,
+                 events.suppressed, events.lost);
+    }
+}
+
 /* A line for each violated requirement, and one that says how many were met, which were not exercised, and whether a
  * checkpoint made them begin anew. */
 static void report_requirements(const fcsl_run_t *run, const uint8_t *verdicts)
@@ -133,6 +142,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->messages_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     report_lost_requests(fcsl_run_machine(loop->run), data);
+    report_events(loop->run);
     report_requirements(loop->run, loop_verdicts(loop, data));
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);

@@ -112,6 +112,7 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     put_hal(out, loop, data);
     put_text(out, "guard", guard_state_name(loop->guard_state));
     put_counters(out, machine, &loop->stats, data);
+    fcsl_vars_events(out, loop->run);
     fcsl_vars_lost_requests(out, machine, data);
     fcsl_vars_requirements(out, loop->run, loop_verdicts(loop, data));
     fcsl_vars_times(out, loop->run);

@@ -38,6 +38,26 @@ void fcsl_note_write_at(fcsl_run_t *noted, uint64_t tick, const fcsl_write_t *wr
     recorded++;
 }
 
+/* The machine reports no events. */
+uint32_t fcsl_events_left(const fcsl_run_t *run, uint32_t instance, uint8_t bytes[FCSL_EVENTS_LEFT_MAX])
+{
+    (void)run;
+    (void)instance;
+    (void)bytes;
+    return 0;
+}
+
+void fcsl_events_substitute(fcsl_run_t *run, uint32_t instance)
+{
+    (void)run;
+    (void)instance;
+}
+
+void fcsl_events_settle(fcsl_run_t *run)
+{
+    (void)run;
+}
+
 static uint32_t at(uint32_t instance, size_t member)
 {
     return (uint32_t)(offsetof(memory_t, instances) + instance * sizeof(instance_t) + member);

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .descriptor import Channel, FaultPlace, Field, Instance, Machine, Transition
     from .errors import BagError, MapError, OverwrittenWarning, TwinError
+    from .events import Event
     from .requirements import not_exercised
     from .telemetry.receiver import Telemetry
     from .twin.alg_twin import AlgTwin, PyTwin
@@ -34,6 +35,7 @@ _HOME = {
     "AlgTwin": "twin.alg_twin",
     "BagError": "errors",
     "Channel": "descriptor",
+    "Event": "events",
     "FaultPlace": "descriptor",
     "Field": "descriptor",
     "Instance": "descriptor",
@@ -57,6 +59,7 @@ __all__ = [
     "AlgTwin",
     "BagError",
     "Channel",
+    "Event",
     "FaultPlace",
     "Field",
     "Instance",

@@ -6,7 +6,7 @@ This is the only Python copy of the C layout; a test compares it with the compil
 
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 
-ABI_VERSION = 11
+ABI_VERSION = 12
 NO_OFFSET = 0xFFFFFFFF
 
 #: fcsl_type_t by number, with the struct format of one scalar in native byte order.
@@ -25,6 +25,9 @@ TYPE_FORMATS = {
 }
 #: fcsl_health_t by number.
 HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
+#: fcsl_severity_t by number.
+SEVERITY_NAMES = ("debug", "info", "warning", "error")
+EVENT_VALUES, EVENTS_PER_TICK = 4, 64
 #: fcsl_role_t by number.
 ROLE_NAMES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
 DIRECTION_NAMES = ("sensor", "actuator", "report")
@@ -126,6 +129,34 @@ class CFaultPlace(Structure):
     _fields_ = [("file", c_char_p), ("line", c_uint32), ("column", c_uint32), ("cause", c_char_p)]
 
 
+class CEventSite(Structure):
+    _fields_ = [
+        ("instance", c_uint32),
+        ("file", c_char_p),
+        ("line", c_uint32),
+        ("column", c_uint32),
+        ("text", c_char_p),
+        ("severity", c_uint8),
+        ("value_count", c_uint8),
+        ("types", c_uint8 * EVENT_VALUES),
+    ]
+
+
+class CEvent(Structure):
+    _fields_ = [("site", c_uint32), ("values", c_uint64 * EVENT_VALUES)]
+
+
+class CEvents(Structure):
+    _fields_ = [
+        ("count", c_uint32),
+        ("lost", c_uint32),
+        ("first_site", c_uint32),
+        ("count_before", c_uint32),
+        ("lost_before", c_uint32),
+        ("list", CEvent * EVENTS_PER_TICK),
+    ]
+
+
 class CMachine(Structure):
     _fields_ = [
         ("abi_version", c_uint32),
@@ -168,6 +199,9 @@ class CMachine(Structure):
         ("step", c_void_p),
         ("force_state", c_void_p),
         ("measured", c_uint8),
+        ("event_sites", POINTER(CEventSite)),
+        ("event_site_count", c_uint32),
+        ("folded", c_void_p),
     ]
 
 

@@ -7,7 +7,7 @@ from ctypes import POINTER, Structure, c_char, c_char_p, c_int, c_int32, c_int64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 
-from .c_machine import CMachine, CMonitor, CRequirement
+from .c_machine import EVENT_VALUES, CMachine, CMonitor, CRequirement
 from .hardware import CSimulatedHardware
 from .library import bind_runtime
 from .parameters import CParameters
@@ -78,6 +78,14 @@ class CTime(Structure):
     ]
 
 
+class CToldEvent(Structure):
+    """fcsl_told_event_t"""
+
+    _fields_ = [("tick", c_uint64), ("site", c_uint32), ("suppressed", c_uint32), ("values", c_uint64 * EVENT_VALUES)]
+
+
+#: FCSL_EVENT_TEXT_MAX
+EVENT_TEXT_BYTES = 256
 #: FCSL_VERDICT_TEXT_MAX
 VERDICT_TEXT_BYTES = 1280
 
@@ -117,6 +125,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_hw_sim_register": (c_uint32, [POINTER(CSimulatedHardware), c_uint32]),
     "fcsl_hw_sim_set_register": (c_int32, [POINTER(CSimulatedHardware), c_uint32, c_uint32]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_substitute_events": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_next_event": (c_uint64, [ptr, c_uint64, POINTER(CToldEvent)]),
+    "fcsl_event_text": (None, [POINTER(CMachine), POINTER(CToldEvent), ptr]),
     "fcsl_run_impure_executes": (c_uint64, [ptr]),
     "fcsl_run_enter_mode": (c_uint64, []),
     "fcsl_run_ieee_mode": (c_uint64, []),

@@ -16,6 +16,7 @@ from .c_machine import (
     HEALTH_NAMES,
     IMPURE,
     ROLE_NAMES,
+    SEVERITY_NAMES,
     TYPE_NAMES,
     WRITABLE,
     CMachine,
@@ -170,6 +171,19 @@ class FaultPlace:
 
 
 @dataclass(frozen=True)
+class EventSite:
+    """A place in the source that reports an event, of instance number `instance`. `types`: of its values."""
+
+    instance: int
+    file: str
+    line: int
+    column: int
+    text: str
+    severity: str
+    types: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Machine:
     """A machine's descriptor. `fields` maps path to field, in descriptor order."""
 
@@ -187,6 +201,7 @@ class Machine:
     channels: tuple[Channel, ...]
     #: What the numbers of `counters.fault_place` mean, from 1.
     fault_places: tuple[FaultPlace, ...] = ()
+    event_sites: tuple[EventSite, ...] = ()
     #: What plots and viewers show, as JSON text (docs/reference/language.md, views); "" for none.
     views: str = ""
     #: Whether it describes only the part of the machine that a telemetry sender sends.
@@ -327,6 +342,22 @@ def _read_fault_places(machine: Any) -> tuple[FaultPlace, ...]:
     return tuple(FaultPlace(_text(p.file), p.line, p.column, _text(p.cause)) for p in raw)
 
 
+def _read_event_sites(machine: Any) -> tuple[EventSite, ...]:
+    raw = [machine.event_sites[i] for i in range(machine.event_site_count)]
+    return tuple(
+        EventSite(
+            instance=s.instance,
+            file=_text(s.file),
+            line=s.line,
+            column=s.column,
+            text=_text(s.text),
+            severity=SEVERITY_NAMES[s.severity],
+            types=tuple(TYPE_NAMES[t] for t in s.types[: s.value_count]),
+        )
+        for s in raw
+    )
+
+
 def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
     """The descriptor at `pointer`, whose tables must have been validated (fcsl_run_open does that)."""
     machine = pointer.contents
@@ -349,6 +380,7 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         transitions=_read_transitions(machine, states, requests, names),
         channels=_read_channels(machine, fields),
         fault_places=_read_fault_places(machine),
+        event_sites=_read_event_sites(machine),
         views=_text(machine.views),
     )
 

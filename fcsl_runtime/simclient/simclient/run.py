@@ -21,6 +21,7 @@ from .library import runtime_library
 from .parameters import CParameters, Parameters
 
 if TYPE_CHECKING:
+    from .events import Event
     from .instance_times import InstanceTime
     from .requirements import Verdict
 
@@ -271,6 +272,16 @@ class Run:
     def substitute(self, instance: int, data: bytes) -> None:
         """Replaces the next tick's execute of an impure instance by its recorded result."""
         self._check(self._lib.fcsl_run_substitute(self.handle(), instance, data, len(data), byref(self._error)))
+
+    def substitute_events(self, instance: int, data: bytes) -> None:
+        """Replaces the events of that execute by the recorded ones."""
+        self._check(self._lib.fcsl_run_substitute_events(self.handle(), instance, data, len(data), byref(self._error)))
+
+    def events(self) -> list[Event]:
+        """The last events that the algorithms reported, at most 1024."""
+        from .events import read_events
+
+        return read_events(self._lib, self.handle(), self.machine)
 
     def impure_executes(self) -> int:
         """Executes of impure instances that were not substituted."""

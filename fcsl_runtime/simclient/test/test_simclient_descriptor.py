@@ -19,6 +19,10 @@ STRUCTS = {
     "fcsl_transition_t": c_machine.CTransition,
     "fcsl_channel_t": c_machine.CChannel,
     "fcsl_fault_place_t": c_machine.CFaultPlace,
+    "fcsl_event_site_t": c_machine.CEventSite,
+    "fcsl_event_t": c_machine.CEvent,
+    "fcsl_events_t": c_machine.CEvents,
+    "fcsl_told_event_t": c_run.CToldEvent,
     "fcsl_machine_t": c_machine.CMachine,
     "fcsl_error_t": c_run.CError,
     "fcsl_record_options_t": c_run.CRecordOptions,
@@ -34,6 +38,10 @@ C_CONSTANTS = {
     **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.HEALTH_NAMES)},
     **{f"FCSL_ROLE_{n.upper()}": i for i, n in enumerate(c_machine.ROLE_NAMES)},
     **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.DIRECTION_NAMES)},
+    **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.SEVERITY_NAMES)},
+    "FCSL_EVENT_VALUES": c_machine.EVENT_VALUES,
+    "FCSL_EVENTS_PER_TICK": c_machine.EVENTS_PER_TICK,
+    "FCSL_EVENT_TEXT_MAX": c_run.EVENT_TEXT_BYTES,
 }
 
 

@@ -190,7 +190,10 @@ typedef enum {
      * of that very tick left them, in the order of the fields */
     FCSL_WRITE_IMPURE = 6,
     FCSL_WRITE_FAULT = 7, /* path: an instance; fcsl_run_inject_fault */
-    FCSL_WRITE_HEALTH = 8 /* path: an instance; element: the health; fcsl_run_inject_health */
+    FCSL_WRITE_HEALTH = 8, /* path: an instance; element: the health; fcsl_run_inject_health */
+    /* path: as that of FCSL_WRITE_IMPURE; data: the events of that execute: for each the number of its site within the
+     * instance, and its values, u64 each */
+    FCSL_WRITE_EVENTS = 9
 } fcsl_write_kind_t;
 
 /* ---- checkpoints ------------------------------------------------------------------------------------------------ */
@@ -282,6 +285,41 @@ void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, f
 const fcsl_field_t *fcsl_run_kept_values(const fcsl_run_t *run, uint32_t index, uint32_t *count);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
 void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
+
+/* ---- events ------------------------------------------------------------------------------------------------------ */
+
+/* The last events are kept. Of one event of one instance so many are told in each second of the machine, the others are
+ * counted. */
+enum { FCSL_EVENTS_KEPT = 1024, FCSL_EVENTS_PER_SECOND = 10, FCSL_EVENT_TEXT_MAX = 256 };
+
+/* An event that a machine reported (fcsl_machine.h). */
+typedef struct {
+    uint64_t tick;
+    uint32_t site; /* index into event_sites */
+    uint32_t suppressed; /* of this site since the one before it */
+    uint64_t values[FCSL_EVENT_VALUES];
+} fcsl_told_event_t;
+
+typedef struct {
+    uint64_t told;
+    uint64_t suppressed; /* too many of a site in a second */
+    uint64_t lost; /* too many in a tick: FCSL_EVENTS_PER_TICK */
+} fcsl_event_counts_t;
+
+/* These three may be called from any thread. */
+fcsl_event_counts_t fcsl_run_event_counts(const fcsl_run_t *run);
+/* Event `number`, counted from 0; 0, or -1: not told yet, or no longer kept. */
+int fcsl_run_event(const fcsl_run_t *run, uint64_t number, fcsl_told_event_t *event);
+/* The first event from `number` on that is kept, and returns the number behind it; 0: there is none. */
+uint64_t fcsl_run_next_event(const fcsl_run_t *run, uint64_t number, fcsl_told_event_t *event);
+/* "gate passed 3 0.5": the text and its values; behind them how many were suppressed. */
+void fcsl_event_text(const fcsl_machine_t *machine, const fcsl_told_event_t *event, char text[FCSL_EVENT_TEXT_MAX]);
+/* "debug", "info", "warning", "error" */
+const char *fcsl_severity_name(uint8_t severity);
+/* Replaces the events of the next tick's execute of an instance that fcsl_run_substitute replaces, by recorded ones
+ * (FCSL_WRITE_EVENTS). */
+int fcsl_run_substitute_events(fcsl_run_t *run, uint32_t instance, const void *bytes, uint32_t size,
+                               fcsl_error_t *error);
 
 /* ---- times of instances ------------------------------------------------------------------------------------------ */
 

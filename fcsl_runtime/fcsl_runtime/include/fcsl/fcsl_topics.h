@@ -27,6 +27,8 @@ int fcsl_topics_add_instance(fcsl_topics_t *topics, uint32_t topic, uint32_t ins
                              fcsl_error_t *error);
 /* State, health and faults: where something changed. Transitions: each one. */
 int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tick_message_t what, fcsl_error_t *error);
+/* The events that the machine reports, each one, from now on. */
+int fcsl_topics_add_events(fcsl_topics_t *topics, uint32_t topic, fcsl_error_t *error);
 /* A message of actuator or of report channels, every tick; the composer must outlive the topics. */
 int fcsl_topics_add_channels(fcsl_topics_t *topics, uint32_t topic, fcsl_direction_t direction,
                              const fcsl_ros_composer_t *composer, uint32_t size, fcsl_error_t *error);

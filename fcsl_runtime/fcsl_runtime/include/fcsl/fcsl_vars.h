@@ -103,6 +103,8 @@ void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats);
 void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const uint8_t *data);
 /* `requirements`: the verdict on each by its id. `data`: of fcsl_run_gather_verdicts, or a copy. */
 void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const uint8_t *data);
+/* `events`: how many the machine has reported, and the last of them. */
+void fcsl_vars_events(fcsl_vars_out_t *out, const fcsl_run_t *run);
 /* `times`: of each instance and of the step; nothing where the machine is not measured. */
 void fcsl_vars_times(fcsl_vars_out_t *out, const fcsl_run_t *run);
 

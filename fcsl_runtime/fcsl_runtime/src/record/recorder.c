@@ -15,6 +15,7 @@
 #include "machine/fault_place.h"
 #include "machine/machine_struct.h"
 #include "machine/monitor_memory.h"
+#include "messages/event_message.h"
 #include "messages/schema.h"
 #include "recorder_internal.h"
 
@@ -92,10 +93,21 @@ static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, f
     return 0;
 }
 
-static int add_verdict_topic(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
+static int add_event_topic(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
 {
     char topic[TOPIC_BYTES];
     recorder->own_topics = FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count;
+    if (recorder->machine->event_site_count == 0) {
+        return 0;
+    }
+    recorder->own_topics++;
+    topic_name(recorder->machine, name_space, "events", topic);
+    return fcsl_bag_add_topic(recorder->bag, topic, "fcsl_msgs/msg/Event", FCSL_SCHEMA_EVENT, 0, error) < 0 ? -1 : 0;
+}
+
+static int add_verdict_topic(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
+{
+    char topic[TOPIC_BYTES];
     if (recorder->verdicts.monitor == NULL) {
         return 0;
     }
@@ -122,7 +134,7 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
         const uint32_t size = recorder->shown[i].layout.size;
         largest = size > largest ? size : largest;
     }
-    return bytes + largest + fcsl_verdict_message_capacity(&recorder->verdicts);
+    return bytes + largest + fcsl_event_message_capacity(machine) + fcsl_verdict_message_capacity(&recorder->verdicts);
 }
 
 static int allocate(fcsl_recorder_t *recorder, const char *views, fcsl_error_t *error)
@@ -202,7 +214,7 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_start_t *start, 
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        add_verdict_topic(recorder, name_space, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
+        add_event_topic(recorder, name_space, error) != 0 || add_verdict_topic(recorder, name_space, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
         put_views(recorder, start->views, start_ns, error) != 0 || start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;

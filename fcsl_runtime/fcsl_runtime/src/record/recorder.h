@@ -46,6 +46,10 @@ void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
 /* The verdicts after the tick just completed: fcsl_verdict_rows_bytes. 0, or -1: there was no room. */
 int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *rows);
 
+/* Events that the tick just completed has told. */
+void fcsl_recorder_events(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_told_event_t *events,
+                          uint32_t count);
+
 int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
                             fcsl_error_t *error);
 int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,

@@ -14,7 +14,8 @@
 
 typedef struct fcsl_recorder fcsl_recorder_t;
 
-/* Topic numbers in the bag: fixed ones, then what is shown of every tick, then verdicts if there are any, then added ones. */
+/* Topic numbers in the bag: fixed ones, then what is shown of every tick, then events and verdicts if the machine has any, then
+ * added ones. */
 enum {
     FCSL_TOPIC_STATE = 0,
     FCSL_TOPIC_TRANSITIONS = 1,
@@ -33,6 +34,7 @@ enum {
     FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
     FCSL_RECORD_CHECKPOINT, /* the machine struct, the monitor's struct */
     FCSL_RECORD_VERDICTS,   /* as verdict_message.h has it */
+    FCSL_RECORD_EVENTS,     /* fcsl_told_event_t, one after another */
     FCSL_RECORD_MESSAGE     /* + topic: a message as it is, at the record's time */
 };
 

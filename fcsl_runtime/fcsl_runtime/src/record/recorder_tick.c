@@ -76,6 +76,17 @@ int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const 
     return 0;
 }
 
+void fcsl_recorder_events(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_told_event_t *events,
+                          uint32_t count)
+{
+    const uint32_t size = count * (uint32_t)sizeof *events;
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_EVENTS, stamp, size, recorder->tick_policy);
+    if (out != NULL) {
+        memcpy(out, events, size);
+        fcsl_ring_publish(&recorder->ring);
+    }
+}
+
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const uint32_t size = recorder->machine->size;

@@ -9,6 +9,7 @@
 #include "recorder.h"
 #include "recorder_internal.h"
 #include "machine/machine_struct.h"
+#include "messages/event_message.h"
 #include "messages/tick_messages.h"
 #include "fcsl/fcsl_tick_time.h"
 
@@ -64,6 +65,19 @@ static int put_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uin
     return put_scratch(recorder, recorder->own_topics - 1u, stamp,
                        fcsl_verdict_message(&recorder->verdicts, recorder->machine, data, stamp, recorder->scratch,
                                             recorder->scratch_size));
+}
+
+static int put_events(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data, uint32_t size)
+{
+    int status = 0;
+    for (uint32_t at = 0; at < size && status == 0; at += (uint32_t)sizeof(fcsl_told_event_t)) {
+        fcsl_told_event_t event;
+        memcpy(&event, data + at, sizeof event);
+        status = put_scratch(
+            recorder, FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count, stamp,
+            fcsl_event_message(recorder->machine, &event, stamp, recorder->scratch, recorder->scratch_size));
+    }
+    return status;
 }
 
 /* Records one fcsl_msgs message of a tick, if there is something to say. */
@@ -148,6 +162,8 @@ static int put_record(fcsl_recorder_t *recorder, const fcsl_record_t *record, co
         return put_checkpoint(recorder, stamp, data);
     case FCSL_RECORD_VERDICTS:
         return put_verdicts(recorder, stamp, data);
+    case FCSL_RECORD_EVENTS:
+        return put_events(recorder, stamp, data, record->size);
     default:
         return put(recorder, record->kind - FCSL_RECORD_MESSAGE, stamp.time_ns, data, record->size);
     }

@@ -10,6 +10,7 @@
 
 #include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_scalar.h"
+#include "messages/event_message.h"
 #include "messages/message.h"
 
 enum {
@@ -18,7 +19,7 @@ enum {
     HEAD_BYTES = 4 + 8 + 8 + 8,
 };
 
-typedef enum { OF_INSTANCE, OF_TICK, OF_ACTUATORS, OF_REPORTS } kind_t;
+typedef enum { OF_INSTANCE, OF_TICK, OF_EVENTS, OF_ACTUATORS, OF_REPORTS } kind_t;
 
 typedef struct {
     kind_t kind;
@@ -28,6 +29,7 @@ typedef struct {
     uint32_t size; /* of each message; of a tick's message: of the last one */
     fcsl_tick_message_t what;
     uint8_t *last_message; /* a tick's message: the last one */
+    uint64_t next_event;   /* that was not put */
     const fcsl_ros_composer_t *composer;
     uint64_t refused;
 } entry_t;
@@ -100,6 +102,13 @@ int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tic
     return 0;
 }
 
+int fcsl_topics_add_events(fcsl_topics_t *topics, uint32_t topic, fcsl_error_t *error)
+{
+    const entry_t entry = {
+        .kind = OF_EVENTS, .topic = topic, .next_event = fcsl_run_event_counts(topics->run).told};
+    return add(topics, &entry, error);
+}
+
 int fcsl_topics_add_channels(fcsl_topics_t *topics, uint32_t topic, fcsl_direction_t direction,
                              const fcsl_ros_composer_t *composer, uint32_t size, fcsl_error_t *error)
 {
@@ -152,6 +161,29 @@ static void put_tick_message(fcsl_topics_t *topics, entry_t *entry, int64_t stam
     }
 }
 
+/* One that finds no room is tried again after the next tick. */
+static void put_events(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(topics->run);
+    fcsl_told_event_t event;
+    uint64_t next = 0;
+    while ((next = fcsl_run_next_event(topics->run, entry->next_event, &event)) != 0) {
+        const fcsl_stamp_t stamp = {.tick = event.tick, .time_ns = 0};
+        const uint32_t bytes =
+            (uint32_t)fcsl_event_message(machine, &event, stamp, topics->scratch, FCSL_MESSAGE_BYTES_MAX);
+        uint8_t *place =
+            bytes == 0u ? NULL
+                        : fcsl_publish_queue_claim(topics->queue, entry->topic, bytes, FCSL_PUBLISH_QUEUE_CHANGE);
+        if (place == NULL) {
+            return;
+        }
+        memcpy(place, topics->scratch, bytes);
+        put_stamp(place, stamp_ns);
+        fcsl_publish_queue_put(topics->queue);
+        entry->next_event = next;
+    }
+}
+
 static void put_channels(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns)
 {
     const uint8_t *memory =
@@ -178,6 +210,9 @@ void fcsl_topics_put(fcsl_topics_t *topics, int64_t stamp_ns)
             break;
         case OF_TICK:
             put_tick_message(topics, entry, stamp_ns);
+            break;
+        case OF_EVENTS:
+            put_events(topics, entry, stamp_ns);
             break;
         default:
             put_channels(topics, entry, stamp_ns);

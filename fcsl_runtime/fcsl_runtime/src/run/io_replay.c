@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
+#include "events.h"
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_scalar.h"
 #include "writes.h"
@@ -127,6 +128,9 @@ int32_t fcsl_io_replay_apply(void *ctx, uint32_t instance)
     }
     run->impure[instance].substituted = 0;
     move(run, instance, run->left + run->impure[instance].offset, 0);
+    if (run->events != NULL) {
+        fcsl_events_substitute(run, instance);
+    }
     return 1;
 }
 
@@ -139,6 +143,23 @@ void fcsl_io_replay_settle(fcsl_run_t *run)
 {
     for (uint32_t i = 0; i < run->machine->instance_count; i++) {
         run->impure[i].substituted = 0;
+    }
+    if (run->events != NULL) {
+        fcsl_events_settle(run);
+    }
+}
+
+/* What the execute of an instance has told, if anything. */
+static void note_events(fcsl_run_t *run, uint32_t instance, uint64_t tick)
+{
+    uint8_t bytes[FCSL_EVENTS_LEFT_MAX];
+    const uint32_t size = fcsl_events_left(run, instance, bytes);
+    if (size > 0) {
+        fcsl_note_write_at(run, tick,
+                           &(fcsl_write_t){.kind = FCSL_WRITE_EVENTS,
+                                           .path = run->machine->instances[instance].name,
+                                           .data = bytes,
+                                           .size = size});
     }
 }
 
@@ -158,6 +179,9 @@ void fcsl_io_replay_note(fcsl_run_t *run, uint64_t tick)
                                                .path = machine->instances[entry->instance].name,
                                                .data = bytes,
                                                .size = impure->size});
+            if (run->events != NULL) {
+                note_events(run, entry->instance, tick);
+            }
         }
     }
 }

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 
 #include "cover.h"
+#include "events.h"
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_library.h"
@@ -121,7 +122,10 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     run->host.ctx = run;
     run->host.substitute = fcsl_io_replay_apply;
     run->host.executed = fcsl_io_replay_executed;
-    return fcsl_times_open(run, error) == 0 ? fcsl_io_replay_open(run, error) : -1;
+    if (fcsl_events_open(run, error) != 0 || fcsl_times_open(run, error) != 0) {
+        return -1;
+    }
+    return fcsl_io_replay_open(run, error);
 }
 
 static int bind_parameter(void *ctx, uint32_t field, const void *bytes, fcsl_error_t *error)
@@ -165,6 +169,7 @@ static void release(fcsl_run_t *run)
     fcsl_io_replay_free(run);
     fcsl_trace_free(run);
     fcsl_monitor_close(run);
+    fcsl_events_free(run);
     fcsl_times_close(run);
     fcsl_write_queue_close(run->write_queue);
     free(run->layouts);

@@ -11,6 +11,7 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
+#include "events.h"
 #include "instance_times.h"
 #include "io_replay.h"
 #include "machine/monitor_memory.h"
@@ -86,6 +87,7 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_RESTORE, .path = "", .data = run->staging, .size = noted});
     memcpy(run->data, run->staging, own);
     fcsl_monitor_restored(run, remembered);
+    fcsl_events_restart(run);
     return 0;
 }
 
@@ -180,6 +182,9 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
     if (run->times != NULL) {
         fcsl_times_begin(run);
     }
+    if (run->events != NULL) {
+        fcsl_events_begin(run);
+    }
     run->machine->step(run->data, &run->host);
     if (run->times != NULL) {
         fcsl_times_end(run);
@@ -192,6 +197,9 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
     }
     if (run->requires_arming) {
         run->requires_arming = fcsl_is_armed(run->machine, run->data);
+    }
+    if (run->events != NULL) {
+        fcsl_events_tell(run, tick);
     }
     if (run->monitor != NULL) {
         fcsl_monitor_tick(run);
@@ -224,6 +232,9 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
     }
     if (run->recorder != NULL) {
         fcsl_recorder_tick(run->recorder, fcsl_run_stamp(run, tick));
+        if (run->events != NULL) {
+            fcsl_events_record(run, tick);
+        }
         if (run->monitor != NULL) {
             fcsl_monitor_note(run, tick);
         }

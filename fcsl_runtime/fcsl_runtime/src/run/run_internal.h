@@ -52,6 +52,7 @@ struct fcsl_run {
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
     struct fcsl_monitor_run *monitor; /* null: no requirements */
+    struct fcsl_event_run *events; /* null: the machine reports none */
     struct fcsl_times *times; /* null: the machine is not measured */
     char *views;               /* of the host; null: those of the machine */
 

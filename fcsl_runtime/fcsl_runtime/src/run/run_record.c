@@ -2,6 +2,7 @@
  *
  * What a run tells of itself: to its recorder, to whoever follows its host writes, and as messages of its last tick.
  */
+#include "events.h"
 #include "instance_times.h"
 #include "record/write_queue.h"
 #include "record/recorder.h"
@@ -20,6 +21,7 @@ int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_
                                        .remembered = fcsl_run_monitor_data(run),
                                        .first = fcsl_run_stamp(run, fcsl_run_tick(run))};
     fcsl_monitor_record(run);
+    fcsl_events_restart(run);
     run->recorder = fcsl_recorder_open(&start, options, error);
     if (run->recorder == NULL) {
         return -1;

@@ -242,6 +242,23 @@ static int check_fault_place(const fcsl_fault_place_t *place)
     return is_name(place->cause) && place->file != NULL && strlen(place->file) <= FILE_MAX_BYTES ? 0 : -1;
 }
 
+/* Sites are in the order of their instances. */
+static int check_event_site(const fcsl_machine_t *machine, uint32_t index)
+{
+    const fcsl_event_site_t *site = &machine->event_sites[index];
+    if (site->instance >= machine->instance_count || site->file == NULL || strlen(site->file) > FILE_MAX_BYTES ||
+        !is_name(site->text) || site->severity > FCSL_ERROR || site->value_count > FCSL_EVENT_VALUES ||
+        (index > 0 && machine->event_sites[index - 1u].instance > site->instance)) {
+        return -1;
+    }
+    for (uint32_t i = 0; i < site->value_count; i++) {
+        if (site->types[i] > FCSL_F64 && site->types[i] != FCSL_HEALTH) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
 static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     const char *name = machine->name;
@@ -286,6 +303,11 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
             return fcsl_fail(error, "machine '%s': fault place %u of its descriptor is inconsistent", name, i);
         }
     }
+    for (uint32_t i = 0; i < machine->event_site_count; i++) {
+        if (check_event_site(machine, i) != 0) {
+            return fcsl_fail(error, "machine '%s': event %u of its descriptor is inconsistent", name, i);
+        }
+    }
     return 0;
 }
 
@@ -316,6 +338,8 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
                        machine->transition_count <= ENTRIES_MAX && machine->channel_count <= UINT16_MAX &&
                        machine->fault_place_count <= ENTRIES_MAX &&
                        (machine->fault_place_count == 0 || machine->fault_places != NULL) &&
+                       machine->event_site_count <= ENTRIES_MAX &&
+                       (machine->event_site_count == 0 || machine->event_sites != NULL) &&
                        (machine->field_count == 0 || machine->fields != NULL) &&
                        (machine->instance_count == 0 || machine->instances != NULL) &&
                        (machine->request_count == 0 || machine->requests != NULL) &&

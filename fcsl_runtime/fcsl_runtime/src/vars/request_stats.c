@@ -9,6 +9,8 @@
 #include "protocol.h"
 #include "value.h"
 
+enum { EVENTS_SHOWN = 64 };
+
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
 {
     fcsl_json_raw(out, "%s\"%s\":%" PRIu64, out->text[out->at - 1] == '{' ? "" : ",", name, value);
@@ -132,6 +134,42 @@ void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const u
     fcsl_vars_end(out);
 }
 
+static void put_event(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const fcsl_told_event_t *event)
+{
+    const fcsl_event_site_t *site = &machine->event_sites[event->site];
+    char text[FCSL_EVENT_TEXT_MAX];
+    fcsl_event_text(machine, event, text);
+    fcsl_json_raw(out, "{\"tick\":%" PRIu64 ",\"severity\":\"%s\",\"instance\":", event->tick,
+                  fcsl_severity_name(site->severity));
+    fcsl_json_quoted(out, machine->instances[site->instance].name);
+    fcsl_json_raw(out, ",\"message\":");
+    fcsl_json_quoted(out, text);
+    fcsl_json_raw(out, ",\"file\":");
+    fcsl_json_quoted(out, site->file);
+    fcsl_json_raw(out, ",\"line\":%" PRIu32 "}", site->line);
+}
+
+void fcsl_vars_events(fcsl_vars_out_t *out, const fcsl_run_t *run)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    const fcsl_event_counts_t events = fcsl_run_event_counts(run);
+    fcsl_vars_begin(out, "events");
+    fcsl_vars_number(out, "told", events.told);
+    fcsl_vars_number(out, "suppressed", events.suppressed);
+    fcsl_vars_number(out, "lost", events.lost);
+    fcsl_json_raw(out, ",\"last\":[");
+    fcsl_told_event_t event;
+    const char *comma = "";
+    uint64_t next = events.told > EVENTS_SHOWN ? events.told - EVENTS_SHOWN : 0;
+    while (next < events.told && (next = fcsl_run_next_event(run, next, &event)) != 0) {
+        fcsl_json_raw(out, "%s", comma);
+        put_event(out, machine, &event);
+        comma = ",";
+    }
+    fcsl_json_raw(out, "]");
+    fcsl_vars_end(out);
+}
+
 void fcsl_vars_times(fcsl_vars_out_t *out, const fcsl_run_t *run)
 {
     fcsl_run_time_t time;
@@ -207,6 +245,9 @@ int fcsl_handle_stats(request_t *request)
         fcsl_vars_number(out, "overruns", overruns);
         put_fault_places(out, machine, data);
         fcsl_vars_lost_requests(out, machine, data);
+    }
+    if (protocol->host->run != NULL && fcsl_run_machine(protocol->host->run)->event_site_count > 0) {
+        fcsl_vars_events(out, protocol->host->run);
     }
     if (protocol->host->run != NULL) {
         fcsl_vars_times(out, protocol->host->run);

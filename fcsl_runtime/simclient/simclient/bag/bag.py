@@ -93,6 +93,11 @@ class RecordedMachine:
         return self.prefix + "/requirements"
 
     @property
+    def events(self) -> str:
+        """Where its algorithms report any (events.py)."""
+        return self.prefix + "/events"
+
+    @property
     def topics(self) -> set[str]:
         return {self.checkpoint, self.writes, self.state, *self.outputs.values()}
 

@@ -20,9 +20,9 @@ from .messages import DESCRIPTOR
 
 #: HostWrite.kind
 _CHANNEL, _RESTORE = 3, 2
-_KINDS = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
+_KINDS = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH", "EVENTS")
 #: What is no doing of a host's: the clock's verdicts, what instances left, the beginning of sampling.
-_NOT_DONE = ("CHANNEL", "OVERRUN", "ATTACH", "IMPURE")
+_NOT_DONE = ("CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "EVENTS")
 _TICK_AT, _VALUE_AT = 20, 28
 _SCALARS = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 #: A longer gap is damage.

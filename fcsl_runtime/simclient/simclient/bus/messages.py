@@ -68,6 +68,7 @@ uint8 ATTACH=5
 uint8 IMPURE=6
 uint8 FAULT=7
 uint8 HEALTH=8
+uint8 EVENTS=9
 std_msgs/Header header
 uint64 tick
 uint8 kind

@@ -22,14 +22,14 @@ from .channels import ChannelComparison
 from .verdict import Divergence, OutputComparison, Verdict
 
 #: HostWrite.kind
-SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range(9)
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH, EVENTS = range(10)
 #: Fields that every bag has; older bags lack ages and stamps of samples.
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage; running it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _READINGS_TYPE = "fcsl_hal/msg/Readings"
 _READINGS_FIELDS = ("tick", "now_ns", "backends", "readings")
-_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
+_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH", "EVENTS")
 
 
 def _readings_topic(bag: Bag, recorded: RecordedMachine) -> str:
@@ -219,6 +219,8 @@ class Replay:
             run.inject_fault(self._instances[path])
         elif kind == HEALTH:
             run.inject_health(self._instances[path], HEALTH_NAMES[write.element])
+        elif kind == EVENTS:
+            run.substitute_events(self._instances[path], data)
         else:
             raise ValueError("unknown kind of write; a newer version of FCSL recorded it")
 

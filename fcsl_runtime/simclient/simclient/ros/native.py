@@ -153,6 +153,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_topics_free": (None, [ptr]),
     "fcsl_topics_add_instance": (c_int, [ptr, c_uint32, c_uint32, c_uint32, _ERROR]),
     "fcsl_topics_add_tick_message": (c_int, [ptr, c_uint32, c_int, _ERROR]),
+    "fcsl_topics_add_events": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_topics_add_channels": (c_int, [ptr, c_uint32, c_int, ptr, c_uint32, _ERROR]),
     "fcsl_topics_put": (None, [ptr, c_int64]),
     "fcsl_topics_put_changes": (None, [ptr, c_int64]),

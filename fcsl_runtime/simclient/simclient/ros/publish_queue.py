@@ -95,6 +95,10 @@ class RunTopics:
         number = TICK_MESSAGES[what]
         self._check(self._library.fcsl_topics_add_tick_message(self._handle, topic, number, byref(self._error)))
 
+    def add_events(self, topic: int) -> None:
+        """What the algorithms report from now on (fcsl_msgs/Event)."""
+        self._check(self._library.fcsl_topics_add_events(self._handle, topic, byref(self._error)))
+
     def add_channels(self, topic: int, direction: str, composer: Composer) -> None:
         """A message of "actuator" or "report" channels, each tick."""
         self._kept.append(composer)

@@ -22,6 +22,7 @@ from .python_run import open_python_run
 from .twin import Twin
 
 if TYPE_CHECKING:
+    from ..events import Event
     from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .profile import Samples
@@ -189,6 +190,10 @@ class AlgTwin(Twin):
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         with self._lock:
             self._run.write_channel(channel, data, age_ticks, stamp_ns)
+
+    def _events(self) -> list[Event]:
+        with self._lock:
+            return self._run.events()
 
     def _times(self) -> dict[str, InstanceTime]:
         with self._lock:

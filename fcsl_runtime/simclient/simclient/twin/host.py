@@ -20,6 +20,7 @@ from ..hardware import Hardware
 from ..paths import Part, Selection, resolve
 
 if TYPE_CHECKING:
+    from ..events import Event
     from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .black_box import BlackBox
@@ -146,6 +147,10 @@ class TwinHost(ABC):
     @abstractmethod
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         """One sample of a sensor channel for the next tick."""
+
+    def _events(self) -> list[Event]:
+        """The last events of the machine."""
+        raise TwinError(f"{type(self).__name__} does not read events")
 
     def _times(self) -> dict[str, InstanceTime]:
         """How long instances, and steps, took so far; empty if the machine is not measured."""

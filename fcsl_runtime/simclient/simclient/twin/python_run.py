@@ -14,14 +14,15 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..c_machine import NO_OFFSET, CMachine, CMonitor
-from ..descriptor import Machine, read_machine
+from ..c_machine import EVENT_VALUES, EVENTS_PER_TICK, NO_OFFSET, CEvents, CMachine, CMonitor
+from ..descriptor import EventSite, Machine, read_machine
 from ..errors import TwinError
+from ..events import pack_values
 from ..parameters import CParameters, Parameters
 from ..run import Run
 
 if TYPE_CHECKING:
-    from fcsl_compiler.api.reference import FaultRow, ReferenceMachine
+    from fcsl_compiler.api.reference import EventRow, FaultRow, ReferenceMachine
 
 
 class CHardware(Structure):
@@ -47,6 +48,7 @@ class CHost(Structure):
         ("substitute", CFUNCTYPE(c_int32, ptr, c_uint32)),
         ("executed", CFUNCTYPE(None, ptr, c_uint32)),
         ("measure", CFUNCTYPE(None, ptr, c_int32)),
+        ("events", POINTER(CEvents)),
     ]
 
 
@@ -139,8 +141,8 @@ class _Host:
     """What `step` may use of the host at `address`, read from there only where it is used
     (fcsl_compiler.reference.machine.Host)."""
 
-    def __init__(self, address: int):
-        self.address, self._host = address, CHost.from_address(address)
+    def __init__(self, address: int, sites: Sequence[EventSite]):
+        self.address, self._host, self._sites = address, CHost.from_address(address), sites
 
     @property
     def clock_ns(self) -> Callable[[], int] | None:
@@ -157,6 +159,21 @@ class _Host:
         return (lambda instance: bool(substitute(context, instance))) if substitute else None
 
     @property
+    def event(self) -> Callable[[int, Sequence[Any]], None] | None:
+        return self._append if self._host.events else None
+
+    def _append(self, site: int, values: Sequence[Any]) -> None:
+        """As fcsl_event.h does."""
+        events = self._host.events.contents
+        if events.count >= EVENTS_PER_TICK:
+            events.lost += 1
+            return
+        event = events.list[events.count]
+        packed = pack_values(self._sites[site], values)
+        event.site, event.values[:] = site, [*packed, *[0] * (EVENT_VALUES - len(packed))]
+        events.count += 1
+
+    @property
     def executed(self) -> Callable[[int], None] | None:
         executed, context = self._host.executed, self._host.ctx
         return (lambda instance: executed(context, instance)) if executed else None
@@ -168,8 +185,8 @@ class PythonMachine:
     Exceptions cannot propagate through C: the first one is stored in `failure`, and its tick is undone.
     """
 
-    def __init__(self, compiled: CMachine, reference: ReferenceMachine):
-        self._reference, self._size = reference, compiled.size
+    def __init__(self, compiled: CMachine, reference: ReferenceMachine, sites: Sequence[EventSite]):
+        self._reference, self._size, self._sites = reference, compiled.size, sites
         self._address, self._memory = 0, memoryview(b"")
         self._host: _Host | None = None
         self.failure: BaseException | None = None
@@ -216,7 +233,7 @@ class PythonMachine:
         memory = self._memory_at(address)
         before = bytes(memory)
         if self._host is None or self._host.address != host:
-            self._host = _Host(host)
+            self._host = _Host(host, self._sites)
         try:
             self._reference.step(memory, self._host)
         except BaseException as error:
@@ -228,13 +245,16 @@ class PythonMachine:
             self._reference.force_state(self._memory_at(address), state)
 
 
-#: Makes a reference of offsets and fault places.
-MakeReference = Callable[[dict[str, int], Sequence["FaultRow"]], "ReferenceMachine"]
+#: Makes a reference of offsets, fault places and sites of events.
+MakeReference = Callable[[dict[str, int], Sequence["FaultRow"], Sequence["EventRow"]], "ReferenceMachine"]
 
 
 def _python_machine(compiled: CMachine, make_reference: MakeReference) -> PythonMachine:
     machine = read_machine(ctypes.pointer(compiled))
-    return PythonMachine(compiled, make_reference(layout_of(compiled, machine), fault_rows_of(machine)))
+    sites = machine.event_sites
+    rows = [(s.instance, s.file, s.line, s.column) for s in sites]
+    reference = make_reference(layout_of(compiled, machine), fault_rows_of(machine), rows)
+    return PythonMachine(compiled, reference, sites)
 
 
 class PythonRun(Run):
@@ -309,7 +329,7 @@ def open_python_run(
     return PythonRun(
         library,
         name,
-        lambda layout, places: ReferenceMachine(checked, layout, places, externs),
-        None if monitor is None else lambda layout, places: ReferenceMachine(monitor.checked, layout, places, None),
+        lambda layout, places, events: ReferenceMachine(checked, layout, places, externs, events),
+        None if monitor is None else lambda layout, places, _: ReferenceMachine(monitor.checked, layout, places, None),
         parameters,
     )

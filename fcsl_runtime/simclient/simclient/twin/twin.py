@@ -32,6 +32,7 @@ from .faults import TwinFaults
 
 if TYPE_CHECKING:
     from ..bag import Bag
+    from ..events import Event
     from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .snapshot import Snapshot
@@ -228,6 +229,14 @@ class Twin(TwinFaults):
         path = "machine.lost_requests"
         counts = self.get_value(path) if path in self.machine.fields else []
         return self.machine.named_lost_requests(counts) if counts else {}
+
+    @property
+    def events(self) -> list[Event]:
+        """What the algorithms have reported with `event(…)` since init, in order: the last 1024 (events.py).
+
+        Of one place of one instance ten are told in each second of the machine; the next one says how many were suppressed.
+        """
+        return self._events()
 
     def instance_times(self) -> dict[str, InstanceTime]:
         """How long each instance took so far, and under "machine" the whole step (instance_times.py). Raises TwinError if the

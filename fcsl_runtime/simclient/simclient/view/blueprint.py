@@ -151,7 +151,7 @@ class Plan:
 
     def _log(self) -> rrb.TextLogView:
         prefix = self._cast.prefix
-        contents = [f"{prefix}/{log}" for log in ("transitions", "health", "requirements", "telemetry")]
+        contents = [f"{prefix}/{log}" for log in ("transitions", "health", "requirements", "events", "telemetry")]
         columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"])
         return rrb.TextLogView(origin=prefix, contents=contents, name="events", columns=columns)
 

@@ -23,6 +23,7 @@ from PIL import Image
 from fcsl_compiler.api.ros_names import recorded_path
 
 from ..bag import Array, Bag, formats
+from ..bag.events import RecordedEvent
 from ..bag.violations import Violation
 from ..complete_output import complete_or_absent
 from ..errors import BagError, ViewError
@@ -49,6 +50,8 @@ _STATE_COLOURS = (
     *("#F4F1C9", "#E3E3E3", "#C9ECE9", "#E8D6C3", "#F4D0EE"),
 )
 _VIOLATION_COLOURS = ("#D62728", "#8C2D9C", "#1F5FB4", "#B05E00", "#00796B", "#5D4037")
+#: Of events. Those that are for debugging have no mark.
+_EVENT_COLOURS = {"info": "#3B6EA5", "warning": "#E08E00", "error": "#C62828"}
 #: A state's name is written above its band if the band has this share of the width, for each letter.
 _SHARE_PER_LETTER = 0.011
 _LABEL_LETTERS, _LABEL_LINES = 26, 3
@@ -165,6 +168,7 @@ def draw(run: RecordedRun, chosen: Choice, title: str, against: str = "") -> Any
         spans = [replace(s, start_s=s.start_s - origin_s, end_s=s.end_s - origin_s) for s in run.spans]
         _draw_states(figure, axes, spans, run.states)
         _draw_violations(figure, axes, run.violations, origin_s)
+        _draw_events(axes, run.events, origin_s)
     across = curve(rows, axis_curve) if axis_curve else None
     for axis, panel in zip(axes, chosen.panels, strict=True):
         lines = [_line(rows, c, across, origin_s) for c in panel.curves]
@@ -281,6 +285,15 @@ def _draw_states(figure: Any, axes: Sequence[Any], spans: Sequence[Span], states
     if {span.state for span in wide} != set(states):
         patches = [Patch(facecolor=colours[state], edgecolor="#888888", label=state) for state in states]
         figure.legend(handles=patches, loc="outside lower left", ncols=8, fontsize=8, frameon=False, title="states")
+
+
+def _draw_events(axes: Sequence[Any], found: Sequence[RecordedEvent], origin_s: float) -> None:
+    """A mark at the foot of each panel for each event."""
+    for severity, colour in _EVENT_COLOURS.items():
+        its = [event.stamp_ns * 1e-9 - origin_s for event in found if event.severity == severity]
+        for axis in axes if its else ():
+            across = axis.get_xaxis_transform()
+            axis.plot(its, [0.0] * len(its), "^", color=colour, transform=across, markersize=4, clip_on=False, zorder=3)
 
 
 def _draw_violations(figure: Any, axes: Sequence[Any], found: Sequence[Violation], origin_s: float) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..bag import Array, Bag, RecordedMachine, has_stamps, stacks, stamps_s
+from ..bag.events import RecordedEvent, events
 from ..bag.fields import field_value, leaf_names
 from ..bag.stamps import Clock
 from ..bag.states import Visit, visits
@@ -80,6 +81,11 @@ class RecordedRun:
     def violations(self) -> list[Violation]:
         """Of the requirements of the machine."""
         return violations(self.bag, self.machine, round(self.spans[-1].end_s * 1e9)) if self.machine else []
+
+    @cached_property
+    def events(self) -> list[RecordedEvent]:
+        """That the algorithms of the machine reported."""
+        return events(self.bag, self.machine) if self.machine else []
 
     @property
     def states(self) -> list[str]:

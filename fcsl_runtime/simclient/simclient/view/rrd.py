@@ -47,7 +47,7 @@ def to_rerun(
     views, remark = (views, "") if views is not None else run.views()
     outputs = [its for its in signals if its.part == "outputs"]
     inside = [its for its in signals if its.part != "outputs"]
-    cast = Cast(run.machine.prefix, outputs, run.states, inside, views, remark, run.violations)
+    cast = Cast(run.machine.prefix, outputs, run.states, inside, views, remark, run.violations, run.events)
     layouts = {its.topic: opened.fixed_layout(its.topic) for its in signals}
     rr.set_strict_mode(True)  # otherwise rerun logs invalid data and writes the rest
     with complete_or_absent(output) as partial:

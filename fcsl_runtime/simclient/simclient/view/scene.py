@@ -10,6 +10,7 @@ Entities have the names of the topics. Their timeline is `sim_time`, the stamps:
     /<ns>/<machine>/health                  a log of instances that degrade, fail, recover
     /<ns>/<machine>/requirements            a log of requirements that are violated, and hold again (of bags)
     /<ns>/<machine>/requirements/<id>       a lane: violated
+    /<ns>/<machine>/events                  a log of what algorithms report (of bags)
     /<ns>/<machine>/telemetry               a log of the receiver: sessions, gaps
     /<ns>/sim/<instance>/<output>           the plant's truth
     /world/…                                the vehicle in 3D (world.py)
@@ -28,6 +29,7 @@ import rerun as rr
 
 from ..bag import Array
 from ..bag.states import StateSample
+from ..bag.events import RecordedEvent
 from ..bag.violations import Violation
 from .lines import TIMELINE, send_lines, times
 from .panels import Choice, choose_by_views, choose_default
@@ -41,6 +43,8 @@ from .world import Batch, World
 _STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
 _HEALTH_COLOURS = (0x3FA65AFF, 0xE3B341FF, 0xE5484DFF, 0x55595FFF)
 _HEALTH_LEVELS = ("INFO", "WARN", "ERROR")
+#: Of an event, as a level of rerun.
+_LEVELS = {"debug": "DEBUG", "info": "INFO", "warning": "WARN", "error": "ERROR"}
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
 #: Width of lines outside of panels.
@@ -54,8 +58,8 @@ class Cast:
     """The shown topics of a run: the machine's begin with `prefix`; `states` are in the order of their colours.
 
     `signals` are outputs of instances and the plant; `inside` are their other values: `nav.inputs`, `nav.state`.
-    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid. `violations` are
-    those of a recorded run.
+    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid. `violations` and
+    `events` are those of a recorded run.
     """
 
     prefix: str
@@ -65,6 +69,7 @@ class Cast:
     views: Views | None = None
     remark: str = ""
     violations: Sequence[Violation] = ()
+    events: Sequence[RecordedEvent] = ()
 
     @cached_property
     def catalogue(self) -> Catalogue:
@@ -156,6 +161,9 @@ class Scene:
         for signals in self.cast.instances:
             self._static(f"{signals.topic}/health", health)
         self._violations()
+        for event in self.cast.events:
+            level = _LEVELS[event.severity]
+            self._event(f"{prefix}/events", event.stamp_ns / _NS, rr.TextLog(str(event), level=level))
 
     def _violations(self) -> None:
         """Logs when requirements were violated, and when they held again."""
