@@ -42,11 +42,10 @@ def test_machines(request: pytest.FixtureRequest) -> None:
     campaign(cases(), max(1, count - count // 3), request.config.getoption("--program-seed"))
 
 
-@pytest.mark.parametrize("backend", ["c", "nim"])
-def test_nan_fails_and_requirements_act(backend: str) -> None:
+def test_nan_fails_and_requirements_act() -> None:
     """NaN fails whole machines, or one instance alone. Requirements have effects, and guard transitions."""
     made, told, healths = [], 0, Counter[str]()
-    for n, case in enumerate(machines(60)):
+    for n, case in enumerate(machines(40)):
         first = next(iter(case.config["instances"]))
         instances = {
             name: i | ({"nan": "fail"} if name == first else {}) for name, i in case.config["instances"].items()
@@ -58,7 +57,9 @@ def test_nan_fails_and_requirements_act(backend: str) -> None:
         told += "is NaN or infinite" in str(trace)
         healths += Counter(v[0] for tick in trace for path, v in tick.items() if path.startswith("requirements."))
     assert told > 4 and min(healths[health] for health in ("nominal", "degraded", "failed")) > 10
-    found = [text for begin in range(0, 60, 10) for text in harness.check(made[begin : begin + 10], backend)]
+    # Tens in turn: half are printed in C, half in Nim.
+    parts = ((made[n : n + 10], "c" if n % 20 == 0 else "nim") for n in range(0, len(made), 10))
+    found = [text for cases, backend in parts for text in harness.check(cases, backend)]
     assert [text for text in found if text] == []
 
 

@@ -12,7 +12,7 @@ from fcsl_generator.machines import Case, cases
 
 from fcsl_compiler.driver.passes import compile_machine
 
-COUNT = 60
+COUNT = 30
 
 
 def rates_of(config: dict[str, Any], moved: list[str]) -> dict[str, Any] | None:
