@@ -86,7 +86,7 @@ CHECKS = (
     tests(
         "generated programs: by Nim = CPython = oracle",
         "test_nim_backend.py",
-        *("-k", "generated_ones", "--programs", scaled("400", "40000"), "--program-seed", "2"),
+        *("-k", "generated_ones", "--programs", scaled("200", "40000"), "--program-seed", "2"),
     ),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
     script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
