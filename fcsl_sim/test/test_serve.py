@@ -19,8 +19,11 @@ from typing import Any
 
 import pytest
 
+from fcsl_compiler.api.build import build_machine
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import Simulation, load
+from fcsl_sim.sim_run import SimRun
+from simclient import SimTwin
 
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 LANDER = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json"
@@ -353,3 +356,21 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert process.returncode == 1 and "end:" in out and not path.exists()
     refused = subprocess.run([*command[:4], "--paused"], capture_output=True, text=True, check=False, timeout=60)
     assert refused.returncode == 2 and "--socket" in refused.stderr
+
+
+def test_times_of_the_machine_are_served(
+    write_sim: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of one that was built with --times; SimTwin and the variable server have the same."""
+    monkeypatch.setenv("FCSL_TIMES", "1")
+    machine = build_machine(Path(__file__).parent / "machines/hopper.json")
+    config = load(write_sim(), machine=(machine.library, machine.name))
+    with SimTwin(SimRun(config)) as twin:
+        twin.tick(7)
+        times = twin.instance_times()
+        assert {name: row.runs for name, row in times.items()} == {"pilot": 7, "machine": 7}
+        assert 0 < times["pilot"].total_ns <= times["machine"].total_ns
+    with served(Simulation(config.plan, config.tables), tmp_path / "sim") as client:
+        client("tick", count=7)
+        assert client.get("times.pilot.runs", "times.machine.runs") == [7, 7]
+        assert client("stats")["times"]["pilot"]["total_ns"] == client.get("times.pilot.total_ns")[0]

@@ -87,7 +87,10 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     published->instance_count = count;
     uint32_t verdict_count = 0;
     const fcsl_field_t *verdicts = sim->external ? NULL : fcsl_run_verdict_fields(sim->run, &verdict_count);
-    published->count = count + published->first_model + (sim->actuators ? 1u : 0u) + (verdicts ? 1u : 0u);
+    uint32_t time_count = 0;
+    const fcsl_field_t *times = sim->external ? NULL : fcsl_run_time_fields(sim->run, &time_count);
+    published->count =
+        count + published->first_model + (sim->actuators ? 1u : 0u) + (verdicts ? 1u : 0u) + (times ? 1u : 0u);
     published->blocks = calloc(published->count + 1u, sizeof *published->blocks);
     published->parts = calloc(published->count + 1u, sizeof *published->parts);
     published->fields = calloc(count + 1u, sizeof(fcsl_field_t *));
@@ -115,12 +118,19 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
         published->parts[published->first_model + count] =
             (fcsl_part_t){.data = actuators->data, .size = actuators->model->size};
     }
+    uint32_t at = published->first_model + count + (sim->actuators ? 1u : 0u);
     if (verdicts) {
-        published->blocks[published->count - 1u] =
+        published->blocks[at] =
             (fcsl_vars_block_t){.prefix = "requirements", .fields = verdicts, .field_count = verdict_count};
         uint32_t size = 0;
         const void *rows = fcsl_run_gather_verdicts(sim->run, &size);
-        published->parts[published->count - 1u] = (fcsl_part_t){.data = rows, .size = size};
+        published->parts[at++] = (fcsl_part_t){.data = rows, .size = size};
+    }
+    if (times) {
+        published->blocks[at] = (fcsl_vars_block_t){.prefix = "times", .fields = times, .field_count = time_count};
+        uint32_t size = 0;
+        const fcsl_time_row_t *rows = fcsl_run_times(sim->run, &size);
+        published->parts[at] = (fcsl_part_t){.data = rows, .size = size};
     }
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }
@@ -130,7 +140,8 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         const char *name = sim->plant.instances[i].name;
-        int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0 || strcmp(name, "requirements") == 0;
+        int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0 ||
+                    strcmp(name, "requirements") == 0 || strcmp(name, "times") == 0;
         for (uint32_t m = 0; m < sim->machine->instance_count && !sim->external; m++) {
             taken = taken || strcmp(name, sim->machine->instances[m].name) == 0;
         }
