@@ -245,7 +245,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 #: Options of `run` that need a flight which is not compared with another.
-_ONE_FLIGHT = ("external", "record", "socket", "telemetry", "observers", "ros", "restore", "save", "speed")
+_ONE_FLIGHT = ("parameters", "external", "record", "socket", "telemetry", "observers", "ros", "restore", "save", "speed")
 
 
 def _fly_on_processor(options: argparse.Namespace, timeout_ms: int) -> int:

@@ -18,6 +18,7 @@ from rclpy.serialization import deserialize_message
 
 from fcsl_msgs.msg import Event, TransitionEvent
 from simclient.errors import TwinError
+from simclient.parameters import read_parameters
 from simclient.ros.publish_queue import RunTopics
 from simclient.run import open_run
 
@@ -57,7 +58,7 @@ class ConfiguredMachine:
 
     def _open(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed) -> None:
         library, machine = find_machine(options["machine"])
-        self.run = open_run(library, machine)
+        self.run = open_run(library, machine, read_parameters(given))
         self._stack.callback(self.run.close)
         self.run.attach()
         self._initial = self.run.save()
@@ -72,7 +73,7 @@ class ConfiguredMachine:
         parts = (self.queue_publisher, self.messages, self._log_transition, self._log_event)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
         self._stack.callback(self.topics.close)
-        self.parameters = MachineParameters(node, self.run, given)
+        self.parameters = MachineParameters(node, self.run)
         self._stack.callback(self.parameters.close)
         self.dropouts = Dropouts(self.run.machine)
         self._services = MachineServices(node, library, self.run, self.dropouts, self.parameters.refresh, allowed)

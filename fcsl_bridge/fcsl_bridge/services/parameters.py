@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -21,11 +21,9 @@ from rclpy.parameter import Parameter
 
 from simclient.c_machine import TYPE_FORMATS
 from simclient.descriptor import Field, Machine
-from simclient.errors import TwinError, did_you_mean
+from simclient.errors import TwinError
 from simclient.run import Run
 from simclient.values import INTEGER_RANGES, encode, enumerators, request_as_read, scalar_reader
-
-from ..errors import BridgeError
 
 _FLOATS = ("f32", "f64")
 #: ROS 2 has no larger integer; larger values of a u64 are shown as this.
@@ -40,15 +38,13 @@ def ros_name(field: Field) -> str:
 
 
 class MachineParameters:
-    """The parameters of a run, declared in a node until `close`. `given` maps ROS names to initial values that
-    replace the machine's. Raises BridgeError for unknown, frozen or invalid ones."""
+    """The parameters of a run, declared in a node until `close`."""
 
-    def __init__(self, node: Node, run: Run, given: Mapping[str, Any]):
+    def __init__(self, node: Node, run: Run):
         self._node, self._run = node, run
         self._fields = {ros_name(f): f for f in run.machine.fields.values() if f.role == "parameter"}
         self._descriptors: dict[str, ParameterDescriptor] = {}
         self._refreshing = False
-        self._begin_with(given)
         for name, field in self._fields.items():
             self._descriptors[name] = _describe(field, run.machine)
             node.declare_parameter(name, self._value(field), self._descriptors[name], ignore_override=True)
@@ -83,26 +79,6 @@ class MachineParameters:
     def reapply(self) -> None:
         """After the machine restarted: sets the machine's values to the node's."""
         self._write([self._node.get_parameter(name) for name, field in self._fields.items() if not field.frozen])
-
-    def _begin_with(self, given: Mapping[str, Any]) -> None:
-        for name, value in given.items():
-            field = self._fields.get(name)
-            if field is None:
-                raise BridgeError(f"unknown parameter `{name}`{self._hint(name)}")
-            try:
-                value = _adopted(value, field, self._run.machine)
-                data = _bytes(value, name, field, self._run.machine)
-                _check(value, name, field)
-                self._run.set(field.index, 0, data)
-            except TwinError as error:
-                raise BridgeError(f"parameter `{name}`: {error}") from None
-
-    def _hint(self, name: str) -> str:
-        machine = self._run.machine
-        if close := did_you_mean(name, self._fields):
-            return close
-        instances = sorted({field.instance for field in self._fields.values()})
-        return f": machine `{machine.name}` has parameters of {', '.join(instances) or 'no instance'}"
 
     def _value(self, field: Field) -> Any:
         """The machine's value in the form of a ROS 2 parameter."""

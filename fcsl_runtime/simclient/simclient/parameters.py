@@ -34,7 +34,7 @@ class CParameters(Structure):
 
 @dataclass(frozen=True)
 class Parameters:
-    """The content of a parameter file; `name` is what errors call it."""
+    """The content of a parameter file; `name` is what errors call it, "" for one that no user has written."""
 
     text: bytes
     name: str
@@ -50,7 +50,7 @@ def read_parameters(given: Given | None) -> Parameters | None:
     if given is None or isinstance(given, Parameters):
         return given
     if isinstance(given, Mapping):
-        return Parameters(_text({"/**": {"ros__parameters": dict(given)}}).encode(), "parameters")
+        return Parameters(_text({"/**": {"ros__parameters": dict(given)}}).encode(), "")
     if not isinstance(given, str | Path):
         raise TwinError(
             f"parameters={given!r}: the path of a parameter file, or a mapping from names to values, wanted"

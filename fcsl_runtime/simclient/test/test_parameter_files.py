@@ -181,7 +181,7 @@ def test_wrong_arguments_of_twins(machine: Path, tmp_path: Path) -> None:
     for given, said in (
         (3, "the path of a parameter file, or a mapping from names to values, wanted"),
         ({"law.gain": object()}, "is no value of a parameter"),
-        ({"law.gain": float("nan")}, "parameters:1: `law.gain`: expected a finite number"),
+        ({"law.gain": float("nan")}, "^`law.gain`: expected a finite number"),
         (tmp_path / "none.yaml", "no such parameter file"),
         (tmp_path, "Is a directory"),
     ):

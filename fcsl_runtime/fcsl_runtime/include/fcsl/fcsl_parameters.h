@@ -20,7 +20,7 @@ extern "C" {
 typedef struct {
     const char *text;
     size_t size;
-    const char *name; /* what errors call it: its path */
+    const char *name; /* what errors call it: its path; "" where a program has made it, and its lines mean nothing */
     const char *name_space; /* of the machine's node, "" for none: `/<name space>/<machine>` is what sections are for */
     int *used; /* null: a file without a section for this machine is refused; else set to 1 where it has one */
 } fcsl_parameters_t;

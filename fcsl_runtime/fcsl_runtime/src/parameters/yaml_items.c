@@ -21,7 +21,8 @@ int yaml_fail(const char *file, uint32_t line, fcsl_error_t *error, const char *
             *at = '?'; /* what a hostile file names shall not steer a terminal */
         }
     }
-    return fcsl_fail(error, "%.120s:%u: %s", file, (unsigned)line, reason);
+    return file[0] != '\0' ? fcsl_fail(error, "%.120s:%u: %s", file, (unsigned)line, reason)
+                           : fcsl_fail(error, "%s", reason);
 }
 
 int yaml_peek(const yaml_cursor_t *cursor)
