@@ -64,9 +64,11 @@ PARAMETERS = {
 }
 
 
-def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = (), safe: float | None = None) -> Path:
+def build(
+    folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = (), safe: float | None = None, times: bool = False
+) -> Path:
     """The library of machine `rig`; its published instances have no message package. safe: of the torque, which the
-    pilot then arms."""
+    pilot then arms. times: of its instances are measured."""
     (folder / "imu.py").write_text(_IMU)
     (folder / "pilot.py").write_text(_PILOT)
     (folder / "slow.py").write_text(_SLOW)
@@ -110,8 +112,7 @@ def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = (), safe:
     if safe is not None:
         config["arm"], config["channels"][1]["safe"] = "pilot.on", safe  # type: ignore[index]
     (folder / "rig.json").write_text(json.dumps(config))
-    done = subprocess.run(
-        ["fcslc", "build", str(folder / "rig.json"), "-o", str(folder / "out")], capture_output=True, text=True
-    )
+    line = ["fcslc", "build", str(folder / "rig.json"), "-o", str(folder / "out"), *(["--times"] if times else [])]
+    done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder / "out" / "librig.so"

@@ -533,6 +533,15 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
     assert ticks == int(shown["tick"])
 
 
+def test_times_of_instances_are_diagnosed(domain: Domain, tmp_path: Path) -> None:
+    _, client = free(domain, rig.build(tmp_path, times=True))
+    while int(figures(client.diagnosed()[0]["rig: times"])["machine runs"]) == 0:
+        pass
+    status = client.diagnosed()[0]["rig: times"]
+    assert status.level == DiagnosticStatus.OK and status.message.endswith(" % of the step")
+    assert int(figures(status)["imu runs"]) <= int(figures(status)["machine runs"])
+
+
 def test_diagnostics_come_each_second_however_time_goes_in_the_simulator(domain: Domain) -> None:
     """Also while waiting for it, and not more often when it is fast."""
     _, client, sim = locked(domain, timeout_s=60.0)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`diagnostics_node`: sensors and devices of a flight with a board, and its lost requests, on /diagnostics. Folders stand for
+"""`diagnostics_node`: sensors and devices of a flight with a board, its lost requests and times, on /diagnostics. Folders stand for
 the kernel's devices."""
 
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from rclpy.serialization import deserialize_message
 from fcsl_bridge.diagnostics.board_status import BoardStatus
 from fcsl_bridge.diagnostics.lost_request_status import LostRequestStatus
 from fcsl_bridge.diagnostics.requirement_status import RequirementStatus
+from fcsl_bridge.diagnostics.time_status import TimeStatus
 from fcsl_bridge.topics import qos
 from fcsl_compiler.base.packages import package_prefix
 from simclient import VarClient
@@ -56,7 +58,7 @@ class Vehicle:
     """Two lidars, a plan for them, and what a node of the graph sees of it."""
 
     def __init__(self, domain: Domain):
-        self._domain, self.socket = domain, domain.folder / "socket"
+        self._domain, self.socket, self.library = domain, domain.folder / "socket", LIBRARY
         domain.environment["FCSL_SYSFS"] = str(domain.folder / "sys")
         for name in DEVICES:
             self.device(name).mkdir(parents=True)
@@ -76,7 +78,7 @@ class Vehicle:
 
     def fly(self, *options: str) -> Process:
         program = package_prefix("fcsl_runtime") / "bin/fcsl-fc"
-        line = [program, LIBRARY, "--machine", "lander_control", "--socket", self.socket, *options]
+        line = [program, self.library, "--machine", "lander_control", "--socket", self.socket, *options]
         return self._domain.run(line)
 
     def fly_with_board(self, *options: str) -> Process:
@@ -260,6 +262,29 @@ def verdict(id_: str, violations: int, holds: bool, assumed: bool = False, kind:
         id_, "It holds.", kind, "x", assumed, status, holds, **counts, violations=violations, first_tick=ticks[0],
         last_tick=ticks[1], line=line,
     )  # fmt: skip
+
+
+def test_times_are_a_status(domain: Domain, vehicle: Vehicle, tmp_path: Path) -> None:
+    """Of a machine that was built with --times."""
+    config = ROOT / "examples/lander/fc/lander_control.json"
+    subprocess.run(["fcslc", "build", "--times", config, "-o", tmp_path], check=True, capture_output=True)
+    vehicle.library = tmp_path / "liblander_control.so"
+    vehicle.fly_with_board("--paused")
+    times = "one/lander_control: times"
+    domain.start("diagnostics_node", "-r", "__ns:=/one", socket=vehicle.socket)
+    assert vehicle.until(lambda _: True)[times].level == OK
+    with VarClient(vehicle.socket) as client:
+        client.tick(3)
+    found = vehicle.until(lambda all_: values(all_[times])["machine runs"] == "3")[times]
+    shown = values(found)
+    assert found.level == OK and re.fullmatch(r"\w+ takes [0-9.]+ % of the step", found.message)
+    assert [shown[f"{name} runs"] for name in ("filter", "safe", "machine")] == ["3", "0", "3"]
+    assert float(shown["filter share"]) < float(shown["machine share"]) == 1.0
+    assert float(shown["filter max us"]) >= float(shown["filter mean us"]) > 0
+
+
+def test_a_machine_without_times_has_no_status_of_them() -> None:
+    assert TimeStatus("rover", "rover").statuses({}) == []
 
 
 def test_requirements_are_a_status() -> None:

@@ -4,7 +4,8 @@
 The machine's status is that of its worst instance; at least WARN while counts grow (missed deadlines, refused inputs,
 dropped records, lost requests), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed
 ERROR, stale (the active state does not schedule it) STALE; at least WARN if it faulted or overran since the previous
-message. The requirements of the machine have one, too (requirement_status.py).
+message. The requirements of the machine have one, too (requirement_status.py), and so have the times of its instances, if
+it measures them (time_status.py).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from simclient.run import Run
 from ..topics import qos
 from .diagnostic_status import Figures, make_status
 from .requirement_status import RequirementStatus
+from .time_status import TimeStatus
 
 _LEVELS = {
     InstanceHealth.NOMINAL: DiagnosticStatus.OK,
@@ -57,6 +59,7 @@ class Diagnostics:
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._name = f"{node.get_namespace().rstrip('/')}/{run.machine.name}"[1:]
         self._requirements = RequirementStatus(self._name, run.machine.name)
+        self._times = TimeStatus(self._name, run.machine.name)
         self._before: dict[str, int] = {}
         self._published_s, self._active = 0.0, False
 
@@ -80,7 +83,8 @@ class Diagnostics:
         for line in self._requirements.begun(verdicts):
             self._node.get_logger().warning(f"requirement {line}")
         machine, requirements = self._machine(state, statuses, active), self._requirements.statuses(verdicts)
-        message = DiagnosticArray(status=[machine, *statuses, *requirements])
+        times = self._times.statuses(self._run.times())
+        message = DiagnosticArray(status=[machine, *statuses, *requirements, *times])
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, _NS)
         self._publisher.publish(message)
 

@@ -14,7 +14,8 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from simclient.requirements import of_stats
+from simclient.instance_times import of_stats as times_of_stats
+from simclient.requirements import of_stats as verdicts_of_stats
 from simclient.vars.client import VarClient
 from simclient.vars.wire import VarError
 
@@ -22,6 +23,7 @@ from ..base.node_main import Option, Stop, read_options, run_node
 from ..diagnostics.board_status import BoardStatus
 from ..diagnostics.lost_request_status import LostRequestStatus
 from ..diagnostics.requirement_status import RequirementStatus
+from ..diagnostics.time_status import TimeStatus
 from ..errors import BridgeError, Stopped
 from ..topics import qos
 
@@ -44,7 +46,7 @@ class BoardWatch:
         self._node, self._address, self._token = node, address, token or None
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._client: VarClient | None = None
-        self._flight: tuple[BoardStatus, LostRequestStatus, RequirementStatus] | None = None
+        self._flight: tuple[BoardStatus, LostRequestStatus, RequirementStatus, TimeStatus] | None = None
         self._statuses: list[DiagnosticStatus] = []
         print(f"waiting for a flight program at {address}", flush=True)
 
@@ -74,14 +76,16 @@ class BoardWatch:
                 BoardStatus(name, machine),
                 LostRequestStatus(name, machine),
                 RequirementStatus(name, machine),
+                TimeStatus(name, machine),
             )
             print(f"{machine}: its board is on /diagnostics", flush=True)
-        board, requests, requirements = self._flight
+        board, requests, requirements, times = self._flight
         counters, stats = self._client.get_value("hal"), self._client.stats()
         lost = stats.get("lost_requests", {})  # a program of an older version does not tell
-        verdicts = of_stats(stats.get("requirements", {}))
+        verdicts = verdicts_of_stats(stats.get("requirements", {}))
         self._statuses = requests.statuses(stats["state"], lost) + board.statuses(counters)
         self._statuses += requirements.statuses(verdicts)
+        self._statuses += times.statuses(times_of_stats(stats.get("times", {})))
 
     def _lose(self, why: str) -> None:
         if self._client is not None:
