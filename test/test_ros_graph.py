@@ -27,7 +27,6 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from zenoh.ext import AdvancedSubscriber, HistoryConfig, declare_advanced_subscriber
 
-from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
 from simclient import VarClient
 from simclient.bag.bag import Bag
@@ -37,7 +36,6 @@ from simclient.bus.free_port import free_endpoint
 ROOT = Path(__file__).resolve().parents[1]
 SIM = ROOT / "examples/lander/sim/lander.sim.json"
 ECHO = ROOT / "scripts/interop/machine/echo.json"
-HASHES = ROOT / "fcsl_runtime/fcsl_runtime/ros_graph/type_hashes.c"
 LIBRARY = Path(get_package_share_directory("lander")).parents[1] / "lib/lander/liblander_machines.so"
 Message = TypeVar("Message")
 LONG_S = 60
@@ -263,12 +261,6 @@ def test_a_hal_of_topics(tmp_path: Path) -> None:
     refused = {name.removeprefix("refused."): n for name, n in counted.items() if name.startswith("refused.") and n}
     assert refused == dict.fromkeys(("repeated", "older", "future", "truncated", "encoding", "nan"), 1)
     assert counted["messages"] >= 3 and counted["superseded"] == 0 and counted["commands"] > 0
-
-
-def test_hashes_of_all_standard_messages() -> None:
-    rows = dict(re.findall(r'{\s*"(\w+/msg/\w+)",\s+"(RIHS01_\w+)"}', HASHES.read_text()))
-    assert set(rows) == {full_name(name) for name in SUPPORTED}
-    assert rows == {kind: installed_hash(kind) for kind in rows}
 
 
 PUMP = """

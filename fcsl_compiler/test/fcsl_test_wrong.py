@@ -1093,7 +1093,6 @@ CONFIGS: dict[str, str] = {
     "E224 no priority": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD}] * 2),
     "E224 equal priorities": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD, "priority": 3}] * 2),
     "E236 a misspelt message": mapped({"type": "sensor_msgs/IMU"}),
-    "E236 a message that no channel can be": mapped({"type": "sensor_msgs/Image"}),
     "E236 a package of somebody's": mapped({"type": "acme_msgs/Thing"}),
     "E237 a misspelt field": mapped({"field": "angular_velocty"}),
     "E237 no such field": mapped({"field": "gyro"}),
@@ -1102,6 +1101,9 @@ CONFIGS: dict[str, str] = {
     "E237 text": mapped({"type": "nav_msgs/Odometry", "field": "child_frame_id"}),
     "E237 an element of no list": mapped({"field": "angular_velocity[0]"}),
     "E237 an element beyond the end": mapped({"field": "orientation_covariance[9]"}),
+    "E237 a list of no elements by key": mapped(
+        {"type": "tf2_msgs/TFMessage", "field": "transforms[frame=base].transform"}
+    ),
     "E237 a quaternion among others": mapped({"type": "geometry_msgs/PoseStamped", "field": "pose"}),
     "E237 a joint by number": mapped({"type": "sensor_msgs/JointState", "field": "position[0]"}, field="one.inputs.x"),
     "E238 a quaternion into three": mapped({"field": "orientation"}),
@@ -1124,6 +1126,15 @@ CONFIGS: dict[str, str] = {
     "E239 axes of an orientation": mapped({"axes": "ned/frd"}),
     "E239 a frame without header": mapped({"type": "geometry_msgs/Twist", "field": "linear", "frame": "base"}),
     "E239 a child frame": mapped({"child_frame": "base"}),
+    "E258 choices of floats": mapped({"choices": ["slow", "fast"]}),
+    "E258 an unknown constant": mapped(
+        {"type": "sensor_msgs/BatteryState", "field": "power_supply_status", "choices": ["FULL"]}, field="one.inputs.n"
+    ),
+    "E258 a choice of no index": mapped(
+        {"type": "nav_msgs/Odometry", "field": "child_frame_id", "choices": ["base"]}, field="one.inputs.x"
+    ),
+    "E258 a choice of nothing": mapped({"choices": []}),
+    "E258 a choice of lists": mapped({"choices": [[1]]}),
     "E241 two types": mapped({}, {"type": "sensor_msgs/MagneticField", "field": "magnetic_field"}),
     "E241 two frames": mapped({"frame": "imu"}, {}),
     "E241 a field twice": mapped({}, {}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plant truth as standard ROS 2 messages: the `ros` list of a `*.sim.json`.
+"""Plant truth as ROS 2 messages: the `ros` list of a `*.sim.json`.
 
     "ros": [{"output": "lander.outputs.pos_z", "type": "nav_msgs/Odometry", "field": "pose.pose.position.z", "topic": "odom"}]
 
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode
-from fcsl_compiler.api.ros import STANDARD, Source, full_name
+from fcsl_compiler.api.ros import Definitions, Source, full_name, interfaces_of, resolve_choices
 from fcsl_compiler.api.sections import Mapped, check_mapped, read_ros
 from fcsl_compiler.api.types import count_of, scalar_of
 from simclient.ros.composer import Composer
@@ -39,10 +39,11 @@ class TruthTopic:
     child_frame: str
     instances: tuple[str, ...]
     sources: tuple[Source, ...]
+    definitions: Definitions
 
     def composer(self) -> Composer:
         """A composer of the message from the structs of `instances`. Raises MapError."""
-        return Composer(STANDARD, self.type, self.sources, self.frame, self.child_frame)
+        return Composer(self.definitions, self.type, self.sources, self.frame, self.child_frame)
 
 
 def read_truth(node: JsonNode | None, reader: ConfigReader, find: FindOutput) -> tuple[TruthTopic, ...]:
@@ -62,7 +63,7 @@ def read_truth(node: JsonNode | None, reader: ConfigReader, find: FindOutput) ->
 
 
 def _read_item(node: JsonNode, reader: ConfigReader, find: FindOutput) -> _Item | None:
-    required, optional = ("output", "type", "field", "topic"), ("frame", "child_frame", "axes")
+    required, optional = ("output", "type", "field", "topic"), ("frame", "child_frame", "axes", "choices")
     keys = reader.object(node, "a mapping of truth", required, optional)
     if keys is None or any(key not in keys for key in required):
         return None
@@ -77,6 +78,8 @@ def _read_item(node: JsonNode, reader: ConfigReader, find: FindOutput) -> _Item 
 
 def _topic(name: str, items: Sequence[_Item]) -> TruthTopic:
     instances = tuple(dict.fromkeys(mapped.name.partition(".")[0] for mapped, _ in items))
+    ros = items[0][0].ros
+    found, message = interfaces_of(ros), full_name(ros.type)
     sources = tuple(
         Source(
             mapped.ros.field,
@@ -86,8 +89,8 @@ def _topic(name: str, items: Sequence[_Item]) -> TruthTopic:
             axes=mapped.ros.axes,
             memory=instances.index(mapped.name.partition(".")[0]),
             name=mapped.name,
+            choices=resolve_choices(found, message, mapped.ros.field, mapped.ros.choices),
         )
         for mapped, field in items
     )
-    ros = items[0][0].ros
-    return TruthTopic(name, full_name(ros.type), ros.frame, ros.child_frame, instances, sources)
+    return TruthTopic(name, message, ros.frame, ros.child_frame, instances, sources, found.members)

@@ -20,7 +20,7 @@ from fcsl_sim.ros import TruthTopic
 from simclient.ros.topics import composer_of, topics_of
 
 from ..topics import qos, tf
-from ..topics.interfaces import message_class
+from ..topics.interfaces import mapped_class, message_class
 from ..topics.queue_publisher import QueuePublisher
 
 
@@ -64,7 +64,8 @@ class SimTopics:
         self._sensors = []
         for mapped in topics_of(sim.machine):
             if mapped.direction == "sensor":
-                publisher = qos.publisher(node, message_class(mapped.type), below(name_space, mapped.name), qos.STREAM)
+                kind = mapped_class(mapped.type, mapped.type_hash)
+                publisher = qos.publisher(node, kind, below(name_space, mapped.name), qos.STREAM)
                 channels = [channel.index for channel in mapped.channels]
                 self._sensors.append((queue_publisher.add(publisher), composer_of(mapped), channels))
 

@@ -7,6 +7,8 @@ import importlib
 import re
 from typing import Any
 
+from fcsl_compiler.api.files import read_json
+from fcsl_compiler.api.packages import PackageNotFound, package_share
 from simclient.descriptor import Instance
 
 from ..errors import BridgeError
@@ -30,6 +32,26 @@ def message_class(type_name: str) -> Any:
     found = getattr(module, name, None)
     if found is None:
         raise BridgeError(f"message {type_name} does not exist in package `{package}`; build that package again")
+    return found
+
+
+def mapped_class(type_name: str, type_hash: str) -> Any:
+    """The class of a message of mapped channels. Raises BridgeError if it is not installed with the definition that the
+    machine was compiled with, because its bytes would be misread."""
+    found = message_class(type_name)
+    package, _, name = type_name.split("/")
+    try:
+        described = read_json(package_share(package) / "msg" / f"{name}.json")
+        installed = next(t["hash_string"] for t in described["type_hashes"] if t["type_name"] == type_name)
+    except (PackageNotFound, OSError, ValueError, LookupError, TypeError, StopIteration):
+        raise BridgeError(
+            f"message {type_name}: package `{package}` is installed without its type description; build it again"
+        ) from None
+    if installed != type_hash:
+        raise BridgeError(
+            f"message {type_name} is installed with another definition than the one that the machine was compiled with "
+            f"({installed} instead of {type_hash}); compile the machine again, or source the other workspace"
+        )
     return found
 
 

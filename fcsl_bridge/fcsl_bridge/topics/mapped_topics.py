@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The channels of a machine that the JSON maps onto standard messages: subscribed topics, read at each tick, and
+"""The channels of a machine that the JSON maps onto messages: subscribed topics, read at each tick, and
 published topics.
 """
 
@@ -18,7 +18,7 @@ from simclient.run import Run
 from ..base.node_main import wait_for_receivers
 from ..base.polling import PolledSubscription
 from . import qos, tf
-from .interfaces import message_class
+from .interfaces import mapped_class, message_class
 from .queue_publisher import QueuePublisher
 
 #: For all receivers together to have the last commands.
@@ -38,7 +38,7 @@ class Inputs:
     def __init__(self, node: Node, run: Run):
         self._node = node
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
-        ready = [(topic, SampleInput(run, topic), message_class(topic.type)) for topic in topics]
+        ready = [(topic, SampleInput(run, topic), mapped_class(topic.type, topic.type_hash)) for topic in topics]
         self._inputs = [
             _Input(node, t, sample_input, PolledSubscription(node, kind, t.name, qos.SENSOR))
             for t, sample_input, kind in ready
@@ -61,7 +61,7 @@ class Inputs:
     def troubles(self) -> dict[str, int]:
         """Numbers of refused messages, by reason; and how often a topic was found to have several publishers."""
         for one in self._inputs:
-            one.contested += one.topic.type != _SHARED and self._node.count_publishers(one.name) > 1
+            one.look_at_publishers()
         contested = {f"hal.{one.topic.name} has several publishers": one.contested for one in self._inputs}
         return self._counts(lambda reason: reason not in _HARMLESS) | contested
 
@@ -99,7 +99,8 @@ class _Input:
     def __init__(self, node: Node, topic: RosTopic, sample_input: SampleInput, polled: PolledSubscription):
         self._node, self.topic, self._samples, self._polled = node, topic, sample_input, polled
         self._frame_reported = False
-        self._superseded = self.contested = 0
+        self._foreign = False  # whether a publisher has another definition of the message
+        self._superseded = self._misread = self.contested = 0
         self.odd, self.warned = 0, False
 
     @property
@@ -114,6 +115,9 @@ class _Input:
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         waiting = self._polled.take_all()
+        if self._foreign:  # a message does not say whose it is
+            self._misread += len(waiting)
+            return
         while waiting:
             message = waiting.pop()
             if self._samples.deliver(message, now_ns, missing):
@@ -122,6 +126,18 @@ class _Input:
                 self._frame_reported = True
                 self._report_frame(message)
         self._superseded += len(waiting)
+
+    def look_at_publishers(self) -> None:
+        """Takes no messages while one publisher has another definition of them, which would be misread."""
+        found = self._node.get_publishers_info_by_topic(self.name)
+        self.contested += self.topic.type != _SHARED and len(found) > 1
+        others = {str(p.topic_type_hash) for p in found if p.topic_type_hash.version} - {self.topic.type_hash}
+        if others and not self._foreign:
+            self._node.get_logger().error(
+                f"{self.name}: refused: a publisher has another definition of {self.topic.type} ({min(others)} instead "
+                f"of {self.topic.type_hash}); build both sides with the same one"
+            )
+        self._foreign = bool(others)
 
     def _report_frame(self, data: bytes) -> None:
         """Logs the frames of the first message that was refused for them."""
@@ -134,7 +150,8 @@ class _Input:
 
     def counts(self) -> dict[str, int]:
         counts = self._samples.counts()
-        return counts | {"superseded": counts.get("superseded", 0) + self._superseded}
+        misread = {"definition": self._misread} if self._misread else {}
+        return counts | {"superseded": counts.get("superseded", 0) + self._superseded} | misread
 
     def close(self) -> None:
         self._polled.close()
@@ -149,7 +166,7 @@ class Outputs:
     ):
         self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
-        ready = [(t, composer_of(t), message_class(t.type)) for t in topics]
+        ready = [(t, composer_of(t), mapped_class(t.type, t.type_hash)) for t in topics]
         self._outlets: list[tuple[RosTopic, Any, Any]] = [
             (topic, composer, qos.publisher(node, kind, topic.name, qos.COMMAND)) for topic, composer, kind in ready
         ]

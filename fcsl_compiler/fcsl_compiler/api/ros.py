@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard ROS 2 messages, and conversions by which C reads and makes them."""
+"""ROS 2 messages, and conversions by which C reads and makes them."""
 
+from ..ros.channels import interfaces_of
+from ..ros.choices import resolve as resolve_choices
 from ..ros.composer import Source, composer_conversion
 from ..ros.conversion import ComposerConversion, ConversionError, ReaderConversion, Term
 from ..ros.message_fields import QUATERNION_AXES, VECTOR_AXES, Kind
@@ -24,7 +26,9 @@ __all__ = [
     "composer_conversion",
     "full_name",
     "has_stamp",
+    "interfaces_of",
     "reader_conversion",
+    "resolve_choices",
     "scalars_of",
     "select_all",
     "short_name",

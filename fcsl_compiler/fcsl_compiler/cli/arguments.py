@@ -24,6 +24,7 @@ _EXAMPLES = {
     "scan": "build/libcraft.so",
     "externs": "craft.json --target board",
     "messages": "craft.json -o msg",
+    "interfaces": "craft.json",
     "graph": "craft.json -o craft.svg",
     "schema": "simulation",
     "new": "machine craft",
@@ -185,6 +186,9 @@ def _add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     graph.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout"
     )
+
+    text = "store the definitions of a machine's ROS 2 messages beside it, as craft.interfaces.json"
+    _add(commands, "interfaces", text).add_argument("config", type=Path, help="machine JSON")
 
     schema = _add(commands, "schema", "print the JSON Schema of a kind of file, for editors")
     schema.add_argument("of", nargs="?", default="machine", help="machine (default), board, simulation or study")

@@ -88,6 +88,7 @@ COMMANDS = Commands(
             ("test", Verb(_MACHINES, "run the tests of a folder with pytest", _test)),
             _verb("cover", _MACHINES, "run tests, and report which lines and conditions of algorithms they cover"),
             _verb("prove", _MACHINES, "show that requirements hold for all inputs, or how they fail"),
+            _verb("interfaces", _MACHINES, "store the definitions of a machine's ROS 2 messages beside it"),
             _verb("graph", _MACHINES, "draw dataflow and state machine"),
             _verb("explain", _MACHINES, "explain a diagnostic code, with an example, or a function", _complete_explain),
             _verb(

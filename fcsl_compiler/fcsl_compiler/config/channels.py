@@ -13,13 +13,14 @@ from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .arming import read_safe
 from .ports import PortResolver
-from .ros import check_channels
+from .ros import check_channels, find_message
 from .times import read_ticks
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
 _ROS_NAME = r"[a-z](_?[a-z0-9])*"
-_ROS_FIELD = re.compile(rf"\.|{_ROS_NAME}(\.{_ROS_NAME})*(\[[^\s\[\]]+\])?")
+_ROS_STEP = rf"{_ROS_NAME}(\[[^\s\[\]]+\])?"
+_ROS_FIELD = re.compile(rf"\.|{_ROS_STEP}(\.{_ROS_STEP})*")
 _ROS_TOPIC = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector; and of a rotation: target axes, source axes.
@@ -161,7 +162,7 @@ def default_topic(name: str) -> str:
 def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | None:
     """Reads the `ros` entry of a channel. Checks that need the message definitions follow in ros.py. `topic`: the
     default topic."""
-    keys = reader.object(node, "`ros`", ("type", "field"), ("topic", "frame", "child_frame", "axes"))
+    keys = reader.object(node, "`ros`", ("type", "field"), ("topic", "frame", "child_frame", "axes", "choices"))
     if keys is None or "type" not in keys or "field" not in keys:
         return None
     found = {"topic": topic}
@@ -181,7 +182,27 @@ def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | N
     axes = reader.choice(keys.get("axes"), "`axes`", AXES)
     if axes is None and "axes" in keys:
         return None
-    return RosMapping(**found, axes=axes or "", spans={key: keys[key].span for key in keys})
+    choices = _choices(keys["choices"], reader) if "choices" in keys else ()
+    interfaces = find_message(found["type"], keys["type"], reader.sink)
+    if interfaces is None or choices is None:
+        return None
+    spans = {key: keys[key].span for key in keys}
+    return RosMapping(**found, axes=axes or "", choices=choices, interfaces=interfaces, spans=spans)
+
+
+def _choices(node: JsonNode, reader: ConfigReader) -> tuple[str | int, ...] | None:
+    """Strings and whole numbers. None after reporting an error."""
+    found: list[str | int] = []
+    for item in reader.list(node, "`choices`"):
+        if not isinstance(item.value, (str, int)) or isinstance(item.value, bool):
+            fix = "write strings, names of constants of the message, or whole numbers"
+            reader.sink.error("E258", "`choices` has something else than these", item.span, help=fix)
+            return None
+        found.append(item.value)
+    if not found:
+        reader.sink.error("E258", "`choices` is empty", node.span, help="list what the indices 0, 1, … stand for")
+        return None
+    return tuple(found)
 
 
 def _bound(

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks values that are mapped to standard ROS 2 messages: each value, and all values of one message together."""
+"""Checks values that are mapped to ROS 2 messages: each value, and all values of one message together."""
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model.literals import round_f32
 from ..model.machine import Channel, RosMapping, Values
-from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
-from ..ros.channels import by_topic, message_of
+from ..model.types import I32, REQUEST, U32, Array, Scalar, Type, count_of, scalar_of
+from ..parse.json_source import JsonNode
+from ..ros.channels import by_topic, interfaces_of, message_of
+from ..ros.choices import resolve
 from ..ros.conversion import ConversionError
-from ..ros.message_fields import FieldError, Kind, Selection, numbers_text, select
-from ..ros.standard_messages import SIZES, STANDARD, SUPPORTED, full_name, short_name
+from ..ros.interfaces import InterfaceError, Interfaces, NoInterface, find_interfaces
+from ..ros.message_fields import LENGTH, FieldError, Kind, Selection, numbers_text, owner_of, select
+from ..ros.standard_messages import SIZES, SUPPORTED, Definitions, Member, full_name, short_name
 
 #: Unit spellings, converted to those of the message table.
 _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "degC": "°C", "A*h": "Ah", "°": "deg"}
@@ -75,43 +79,68 @@ def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> bool:
 
 def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
     """Resolves the numbers of the message that a value maps to. Returns None after reporting an error."""
-    message = full_name(value.ros.type)
-    if message not in SUPPORTED:
-        text = f"`{value.ros.type}` is not a message that a value can be mapped to"
-        sink.error("E236", text, value.at("type"), help=_meant(value.ros.type))
-        return None
+    message, found = full_name(value.ros.type), interfaces_of(value.ros)
     try:
-        selection = _select(message, value.ros.field)
+        selection = _select(found.members, message, value)
     except FieldError as error:
         sink.error("E237", error.args[0], value.at("field"), help=error.args[1])
         return None
-    _check_frames(value, message, sink)
+    try:
+        resolve(found, message, value.ros.field, value.ros.choices)
+    except FieldError as error:
+        sink.error("E258", error.args[0], value.at("choices"), help=error.args[1])
+        return None
+    _check_frames(value, found.members[message], sink)
+    if not (value.ros.choices or selection.is_length or selection.count) and not _check_bound(value, found, sink):
+        return None
+    if value.ros.choices:
+        return selection if _check_choices(value, selection, sink) else None
     if not _check_fit(value, selection, sink):
         return None
     _check_safe(value, selection, sink)
     return selection if _check_axes(value, selection, sink) else None
 
 
+def find_message(type_: str, node: JsonNode, sink: DiagnosticSink) -> Interfaces | None:
+    """The definition of a message that `type` of a mapping names. None after reporting an error."""
+    source = node.span.source
+    try:
+        return find_interfaces(type_, Path(source.path or source.name))
+    except InterfaceError as error:
+        text, fix = error.args
+        meant = _meant(type_) if isinstance(error, NoInterface) else ""
+        sink.error("E236", f"there is no message `{type_}`" if meant else text, node.span, help=meant or fix)
+        return None
+
+
 def _meant(type_: str) -> str:
-    """Help text: the message type that was probably meant, or the list of all."""
+    """Help text: the standard message that was probably meant, or ""."""
     package, _, name = type_.partition("/")
     beside = [n for n in map(short_name, SUPPORTED) if n.startswith(package + "/")]
-    if not beside:
-        packages = sorted({n.partition("/")[0] for n in SUPPORTED})
-        return f"messages of {', '.join(packages[:-1])} and {packages[-1]} can"
     names = {n.partition("/")[2].lower(): n for n in beside}
     close = difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.75)
-    return f"did you mean `{names[close[0]]}`?" if close else f"there are {', '.join(beside)}"
+    return f"did you mean `{names[close[0]]}`?" if close else ""
 
 
-def _select(message: str, field: str) -> Selection:
+def _select(definitions: Definitions, message: str, value: Mapped) -> Selection:
     """Resolves a field and requires that it holds data values. Raises FieldError."""
+    field = value.ros.field
     if field == "header" or field.startswith("header."):
         raise FieldError(
             "the header cannot hold values",
             "its frame_id is `frame`; its stamp is the time of the sample or of the tick",
         )
-    selection = select(STANDARD, message, field)
+    selection = select(definitions, message, field)
+    if selection.kind is Kind.TEXT and not value.ros.choices:
+        raise FieldError(f"`{field}` is text, not a number", "list the strings that it may be in `choices`")
+    list_ = field.removesuffix(f".{LENGTH}")
+    if (
+        selection.is_length
+        and value.direction != "sensor"
+        and owner_of(definitions, message, list_)[1].type not in SIZES
+    ):
+        text = f"`{field}`: the number of messages in a list that is sent is that of the elements that channels fill"
+        raise FieldError(text, "remove this channel")
     for piece in selection.pieces:
         if message == "sensor_msgs/msg/JointState" and not isinstance(piece.element, str):
             raise FieldError(
@@ -121,14 +150,39 @@ def _select(message: str, field: str) -> Selection:
     return selection
 
 
-def _check_frames(value: Mapped, message: str, sink: DiagnosticSink) -> None:
-    members = {member.name for member in STANDARD[message]}
+def _check_frames(value: Mapped, definition: Sequence[Member], sink: DiagnosticSink) -> None:
+    members = {member.name for member in definition}
     for key, member in (("frame", "header"), ("child_frame", "child_frame_id")):
         if getattr(value.ros, key) and member not in members:
             text = f"a `{value.ros.type}` has no `{member}`, so it cannot have a `{key}`"
             stamped = value.ros.type + "Stamped"
-            fix = f"remove it, or use {stamped}" if key == "frame" and full_name(stamped) in STANDARD else "remove it"
+            fix = f"remove it, or use {stamped}" if key == "frame" and full_name(stamped) in SUPPORTED else "remove it"
             sink.error("E239", text, value.at(key), help=fix)
+
+
+def _check_bound(value: Mapped, found: Interfaces, sink: DiagnosticSink) -> bool:
+    """Checks that a bounded list can have all elements of the value."""
+    _, member = owner_of(found.members, full_name(value.ros.type), value.ros.field)
+    if not member.bound or count_of(value.type) <= member.bound:
+        return True
+    text = f"`{value.ros.field}` has at most {member.bound} elements, `{value.name}` is {value.type}"
+    sink.error("E238", text, value.at("field"), help=f"declare it {scalar_of(value.type)}[{member.bound}]")
+    return False
+
+
+def _check_choices(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:
+    """Checks that the value is an index, or as many as the field has numbers, and that a safe one is of a choice."""
+    if scalar_of(value.type) not in (I32, U32) or selection.count != count_of(value.type):
+        wanted = f"i32[{selection.count}]" if selection.count > 1 else "i32"
+        text = f"`{value.name}` is {value.type}, and with `choices` it is an index for `{value.ros.field}`"
+        sink.error("E258", text, value.at("choices"), help=f"declare it {wanted}")
+        return False
+    most = len(value.ros.choices) - 1
+    if any(not isinstance(number, str) and not 0 <= number <= most for number in value.safe):
+        text = f"`safe` of `{value.name}` is no index of `choices`"
+        sink.error("E258", text, value.safe_span or value.span, help=f"write a number from 0 to {most}")
+        return False
+    return True
 
 
 def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:
@@ -250,7 +304,17 @@ def _check_topic(found: list[tuple[Mapped, Selection]], sink: DiagnosticSink) ->
                 _report(text, value, key, fix, first, sink)
                 break
         else:
+            _check_length(value, selection, [other for _, other in found], sink)
             _check_once(value, selection, filled, sink)
+
+
+def _check_length(value: Mapped, selection: Selection, others: Sequence[Selection], sink: DiagnosticSink) -> None:
+    """Checks that the length of a list that is sent has its list."""
+    list_ = value.ros.field.removesuffix(f".{LENGTH}")
+    whole = any(piece.path == list_ and piece.element is None for other in others for piece in other.pieces)
+    if selection.is_length and value.direction != "sensor" and not whole:
+        text = f"`{value.ros.field}` is the length of a list that no channel fills"
+        sink.error("E241", text, value.at("field"), help=f"map the whole list, too: `{list_}`")
 
 
 def _or_none(text: str) -> str:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..base.files import MAX_SOURCE_BYTES, SourceError, digest, read_regular
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
 from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET, TIMES
-from ..parse.machine_texts import MachineTexts, package_of, read_texts
+from ..parse.machine_texts import MachineTexts, message_types, package_of, read_texts
 from .backends import toolchain_of_backend
 from .cache_entry import cached
 from .toolchain import (
@@ -116,12 +116,14 @@ def _cache_key(
     start_version_query()
     texts = read_texts(config)
     externs = _extern_parts(config, target, texts) if texts is not None else None
-    if texts is None or externs is None:
+    messages = _message_parts(config, texts) if texts is not None else None
+    if texts is None or externs is None or messages is None:
         return None
     # A build for coverage contains the full paths of its files, one with a mesh that of the mesh.
     name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if texts.has_mesh else config.name
     parts = [name, package_of(config, config.stem), texts.text, _identity(), toolchain_of_backend(backend), *externs]
     parts += [TIMES] if times else []
+    parts += messages
     for file in texts.files.items():
         parts += file
     if requirements is not None:
@@ -130,6 +132,22 @@ def _cache_key(
         except (OSError, SourceError):
             return None
     return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
+
+
+def _message_parts(config: Path, texts: MachineTexts) -> list[str] | None:
+    """The definitions of the messages of channels that are not standard. None where one cannot be had."""
+    if '"ros"' not in texts.text:
+        return []
+    from ..ros.interfaces import InterfaceError, find_interfaces
+
+    parts: list[str] = []
+    for type_ in message_types(texts.keys):
+        try:
+            found = find_interfaces(type_, config).texts
+        except InterfaceError:
+            return None
+        parts += [part for name in sorted(found) for part in (name, *found[name])]
+    return parts
 
 
 def _extern_parts(config: Path, target: str, texts: MachineTexts) -> list[str | bytes] | None:

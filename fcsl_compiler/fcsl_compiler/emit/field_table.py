@@ -14,6 +14,7 @@ from ..model.c_names import c_name
 from ..model.machine import Channel, Instance, Machine
 from ..model.ranges import UNBOUNDED, Range
 from ..model.types import Scalar, count_of, leaves, scalar_of, shape_of
+from ..ros.channels import definition_texts
 from .names import channel_member, leaf_member, sensors
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
@@ -186,8 +187,9 @@ def layout_hash(machine: Machine, table: Sequence[FieldRow]) -> str:
 
 
 def source_hash(machine: Machine) -> str:
-    """SHA-256 over names and texts of the machine JSON (without `views`) and all algorithm files, and over the instances
-    of a subset machine."""
+    """SHA-256 over names and texts of the machine JSON (without `views`) and all algorithm files, over the definitions of
+    messages that are not standard, and over the instances of a subset machine."""
     texts = [machine.config.name, machine.hashed_text]
     texts += [part for source in machine.sources for part in (source.name, source.text)]
+    texts += definition_texts(machine.channels)
     return digest(*texts, *(("subset", *machine.subset) if machine.subset else ()))

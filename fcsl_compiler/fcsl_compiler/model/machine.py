@@ -201,6 +201,8 @@ class RosMapping:
     frame: str
     child_frame: str
     axes: str  # axes of the machine's value: frd, ned/frd, …
+    choices: tuple[str | int, ...] = ()  # what the indices that the machine has stand for
+    interfaces: Any = dataclass_field(compare=False, default=None)  # ros/interfaces.py: the definition of the message
     spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # spans of the given keys
 
 

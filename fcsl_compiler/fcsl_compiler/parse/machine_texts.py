@@ -36,6 +36,14 @@ class MachineTexts:
         return isinstance(body, dict) and "mesh" in body
 
 
+def message_types(keys: dict[str, Any]) -> list[str]:
+    """The messages that the channels of a machine JSON name."""
+    channels = keys.get("channels")
+    mappings = [c.get("ros") for c in (channels if isinstance(channels, list) else ()) if isinstance(c, dict)]
+    types = [ros.get("type") for ros in mappings if isinstance(ros, dict)]
+    return list(dict.fromkeys(type_ for type_ in types if isinstance(type_, str)))
+
+
 def read_texts(config: Path) -> MachineTexts | None:
     """None where the machine JSON or a file that it names cannot be read."""
     try:

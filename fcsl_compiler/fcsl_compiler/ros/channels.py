@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 
 from ..model.machine import Channel, RosMapping
 from ..model.types import Scalar, Type, count_of, scalar_of
+from .choices import resolve
 from .composer import Source, composer_conversion
 from .conversion import ComposerConversion, ReaderConversion
+from .interfaces import STANDARD_INTERFACES, Interfaces
+from .message_fields import select
 from .reader import Pick, reader_conversion
 from .standard_messages import STANDARD, full_name
+from .type_hash import type_hash
 
 #: The message of std_msgs for one scalar of a type; of arrays its …MultiArray. There is no array of bools.
 _SCALAR = {"bool": "Bool", "i32": "Int32", "i64": "Int64", "u32": "UInt32", "u64": "UInt64"}
@@ -28,6 +32,7 @@ class Message:
 
     channels: tuple[Channel, ...]
     type: str  # full name
+    type_hash: str
     composer: ComposerConversion
     reader: ReaderConversion
 
@@ -44,15 +49,29 @@ def by_topic(channels: Iterable[Channel]) -> list[list[Channel]]:
 def message_of(channels: Sequence[Channel]) -> Message:
     """The message of checked channels, which are parts of one. Raises ConversionError where it would be too large."""
     ros = channels[0].ros
+    message, found = full_name(ros.type), interfaces_of(ros)
     sources, picks = [], []
     for i, c in enumerate(channels):
         type_, count = scalar_of(c.port.type).name, count_of(c.port.type)
-        sources.append(Source(c.ros.field, type_, count, 0, axes=c.ros.axes, memory=i, name=c.name))
-        picks.append(Pick(c.name, (c.ros.field,), type_, count, axes=c.ros.axes, null_refused=True))
-    message = full_name(ros.type)
-    composer = composer_conversion(STANDARD, message, sources, ros.frame, ros.child_frame)
-    reader = reader_conversion(STANDARD, message, picks, ros.frame, ros.child_frame)
-    return Message(tuple(channels), message, composer, reader)
+        choices = resolve(found, message, c.ros.field, c.ros.choices)
+        sources.append(Source(c.ros.field, type_, count, 0, c.ros.axes, memory=i, name=c.name, choices=choices))
+        picks.append(Pick(c.name, (c.ros.field,), type_, count, c.ros.axes, null_refused=True, choices=choices))
+    composer = composer_conversion(found.members, message, sources, ros.frame, ros.child_frame)
+    reader = reader_conversion(found.members, message, picks, ros.frame, ros.child_frame)
+    return Message(tuple(channels), message, type_hash(found.members, message), composer, reader)
+
+
+def interfaces_of(ros: RosMapping) -> Interfaces:
+    """The definition of the message of a mapping."""
+    return STANDARD_INTERFACES if ros.interfaces is None else ros.interfaces
+
+
+def definition_texts(channels: Iterable[Channel]) -> list[str]:
+    """The definitions that the messages of channels consist of and that are not standard, as texts that can be hashed."""
+    texts: dict[str, Sequence[str]] = {}
+    for channel in channels:
+        texts |= interfaces_of(channel.ros).texts
+    return [part for name in sorted(texts) for part in (name, *texts[name])]
 
 
 def payload_of(channel: Channel) -> Message:
@@ -62,10 +81,16 @@ def payload_of(channel: Channel) -> Message:
     """
     if channel.kind == "blob":
         blob = full_name(BLOB)
-        return Message((channel,), blob, composer_conversion(STANDARD, blob, []), reader_conversion(STANDARD, blob, []))
-    ros = channel.ros if channel.ros.type else standard_mapping(channel.port.type)
+        reader = reader_conversion(STANDARD, blob, [])
+        return Message((channel,), blob, type_hash(STANDARD, blob), composer_conversion(STANDARD, blob, []), reader)
+    ros = channel.ros if channel.ros.type and not _is_length(channel.ros) else standard_mapping(channel.port.type)
     message = message_of([replace(channel, ros=ros)])
     return replace(message, reader=replace(message.reader, nan_allowed=True))
+
+
+def _is_length(ros: RosMapping) -> bool:
+    """Whether it is the length of a list, which says nothing without the list."""
+    return select(interfaces_of(ros).members, full_name(ros.type), ros.field).is_length
 
 
 def standard_mapping(type_: Type) -> RosMapping:

@@ -32,7 +32,11 @@ MEMORY |= dict.fromkeys(("TransitionRequest", "Health", "state"), 5)
 SIZES = (1, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
 
 #: fcsl_ros_code_t
-BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END = range(7)
+BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END, FIND, KEY, FOUND, CHOICE = range(11)
+#: Of a pick that is the length itself.
+LENGTH = NONE
+#: The type of a choice that is written as text.
+TEXT = 11
 
 
 class ConversionError(ValueError):
@@ -103,6 +107,30 @@ class Value:
     first_guard: int
     guard_count: int
     rotation: bool
+    limited: bool = False
+    first_choice: int = NONE
+    choice_count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """fcsl_ros_choice_t"""
+
+    index: Term
+    at: int
+    type: int
+    first: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """fcsl_ros_segment_t"""
+
+    offset: int
+    size: int
+    align: int
+    element: int
 
 
 @dataclass(frozen=True)
@@ -116,6 +144,7 @@ class ReaderConversion:
     rows: Sequence[Row]
     terms: Sequence[Term]
     guards: Sequence[Guard]
+    choices: Sequence[int]
     anchor_count: int
     size: int
     stamp_anchor: int
@@ -132,3 +161,7 @@ class ComposerConversion:
     terms: Sequence[Term]
     memory_count: int
     stamp_offset: int
+    choices: Sequence[Choice] = ()
+    names: Sequence[bytes] = ()
+    numbers: Sequence[int] = ()
+    segments: Sequence[Segment] = ()

@@ -23,6 +23,8 @@ _MAX_DEPTH = 16
 _MAX_LISTED = 24
 _STEPS = re.compile(r"\.(?![^\[]*\])")  # dots outside brackets; names in brackets may contain dots
 _STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
+#: Behind the path of a list: its number of elements.
+LENGTH = "count"
 
 
 def numbers_text(count: int) -> str:
@@ -34,6 +36,7 @@ class Kind(Enum):
     """The meaning of a field's numbers as a group. It decides which axes they can have."""
 
     NUMBERS = "numbers"
+    TEXT = "text"  # a string
     VECTOR = "a vector"
     VECTORS = "two vectors"  # such as a twist
     QUATERNION = "a quaternion"  # x, y, z, w
@@ -44,7 +47,7 @@ class Kind(Enum):
         """Allowed axes for this kind."""
         if self is Kind.QUATERNION:
             return QUATERNION_AXES
-        return () if self is Kind.NUMBERS else VECTOR_AXES
+        return () if self in (Kind.NUMBERS, Kind.TEXT) else VECTOR_AXES
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,8 @@ class Piece:
     """`count` adjacent numbers of `type`. `path` leads to a member: a single number, an array or a sequence.
 
     `element` is the index of the selected number, or, in a sequence with a parallel `string[] name`, the name of the
-    selected element. `count` is 0 for a whole sequence of unknown length.
+    selected element. `count` is 0 for a whole sequence of unknown length. The path of a sequence and `.count` is its
+    length. A `string` is one piece.
     """
 
     path: str
@@ -60,6 +64,7 @@ class Piece:
     count: int
     element: int | str | None = None
     unit: str = ""
+    length: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,11 @@ class Selection:
 
     kind: Kind
     pieces: tuple[Piece, ...]
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is the number of elements of a sequence."""
+        return any(p.length for p in self.pieces)
 
     @property
     def count(self) -> int:
@@ -79,6 +89,11 @@ class Selection:
         """The common unit of all numbers, or ""."""
         units = {p.unit for p in self.pieces}
         return units.pop() if len(units) == 1 else ""
+
+
+def length_of(path: str) -> Piece:
+    """The number of elements of the sequence at `path`."""
+    return Piece(f"{path}.{LENGTH}", "uint32", 1, length=True)
 
 
 class FieldError(ValueError):
@@ -94,10 +109,13 @@ def select(definitions: Definitions, message: str, path: str) -> Selection:
     here = Member("", message)
     siblings: tuple[Member, ...] = ()
     element: int | str | None = None
-    for step in _STEPS.split(path):
+    steps = _STEPS.split(path)
+    for number, step in enumerate(steps):
         match = _STEP.fullmatch(step)
         if match is None:
             raise FieldError(f"`{path}` is not a field of a message", "write it such as pose.position.z, or axes[1]")
+        if step == LENGTH and number == len(steps) - 1 and here.sequence and element is None and _has_length(here):
+            return Selection(Kind.NUMBERS, (length_of(done[:-1]),))
         if here.is_array and element is None:
             raise FieldError(
                 f"`{done[:-1]}` is a list of messages", f"take one, such as {done[:-1]}[0].{path[len(done) :]}"
@@ -107,10 +125,22 @@ def select(definitions: Definitions, message: str, path: str) -> Selection:
         siblings = definitions[here.type]
         here = _member(definitions, message, here, match.group(1), done)
         unit = here.unit or unit
-        element = _element(here, match.group(2), siblings, done + here.name)
-        indexed = isinstance(element, int) and here.type in definitions
+        element = _element(definitions, here, match.group(2), siblings, done + here.name)
+        indexed = element is not None and here.type in definitions
         done += f"{here.name}[{element}]." if indexed else f"{here.name}."
     return _numbers(definitions, replace(here, unit=unit), done[:-1], element)
+
+
+def owner_of(definitions: Definitions, message: str, path: str) -> tuple[str, Member]:
+    """The message that has the last member of a valid path, and that member; of `.` the message itself."""
+    owner, member = message, Member("", message)
+    for step in _STEPS.split(path) if path != "." else ():
+        name = step.partition("[")[0]
+        found = next((m for m in definitions.get(member.type, ()) if m.name == name), None)
+        if found is None:  # `.count` of a list
+            break
+        owner, member = member.type, found
+    return owner, member
 
 
 def fields_of(definitions: Definitions, message: str) -> list[str]:
@@ -153,18 +183,45 @@ def _member(definitions: Definitions, message: str, owner: Member, name: str, do
     return found
 
 
-def _element(member: Member, index: str | None, siblings: tuple[Member, ...], path: str) -> int | str | None:
+def _has_length(member: Member) -> bool:
+    return member.type not in ("string", "wstring")
+
+
+def key_of(index: str) -> tuple[str, str]:
+    """The member and its value of an index such as `child_frame_id=base_link`; ("", "") for another one."""
+    name, equals, value = index.partition("=")
+    return (name, value) if equals else ("", "")
+
+
+def _element(
+    definitions: Definitions, member: Member, index: str | None, siblings: tuple[Member, ...], path: str
+) -> int | str | None:
     if index is None:
         return None
+    if "=" in path and member.sequence and not (member.type in SIZES and index.isdigit()):
+        text = f"`{path}[{index}]` lies within an element that is found by its key"
+        raise FieldError(text, f"give the outer list a number, such as {path.partition('[')[0]}[0]")
+    if member.sequence and member.type in definitions and key_of(index)[0]:
+        return _by_key(definitions, member, index, path)
     if not member.is_array:
         raise FieldError(f"`{path}` is not a list", f"write `{path}`")
     if index.isascii() and index.isdigit() and len(index) < 10:
-        end = member.count or MAX_INDEX + 1
+        end = member.count or member.bound or MAX_INDEX + 1
         if int(index) >= end:
             raise FieldError(f"`{path}` has no element {int(index)}", f"the last one is {end - 1}")
         return int(index)
     if not (member.sequence and member.type in SIZES and _has_names(siblings)):
         raise FieldError(f"`{path}` has no element `{index}`", f"write a number, such as {path}[0]")
+    return index
+
+
+def _by_key(definitions: Definitions, member: Member, index: str, path: str) -> str:
+    name, value = key_of(index)
+    strings = [m.name for m in definitions[member.type] if m.type == "string" and not m.is_array]
+    if name not in strings or not value:
+        text = f"`{path}` has no element `{index}`"
+        fix = f"write {path}[{strings[0]}=…]" if strings else f"its elements have no strings; write {path}[0]"
+        raise FieldError(text, fix)
     return index
 
 
@@ -178,6 +235,10 @@ def _numbers(definitions: Definitions, member: Member, path: str, element: int |
         if count in (9, 36) and member.name.endswith("covariance"):
             kind = Kind.COVARIANCE
         return Selection(kind, (Piece(path, member.type, count, element, member.unit),))
+    if member.type == "string" and not member.is_array:
+        if key_of(path.rpartition("[")[2].partition("]")[0])[0] == path.rpartition("].")[2]:
+            raise FieldError(f"`{path}` is the key of its element", "map another field of the element")
+        return Selection(Kind.TEXT, (Piece(path, "string", 1),))
     if member.type not in definitions:
         raise FieldError(f"`{path}` is text, not a number", "a channel carries numbers and bools")
     if member.is_array and element is None:

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 
 from . import axes
 from .conversion import MEMORY, NONE, SIZES, WIRE, ConversionError, Guard, ReaderConversion, Value
-from .message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
-from .rows import Place, Rows, array_of, select_all
+from .message_fields import LENGTH, FieldError, Kind, Piece, Selection, numbers_text, select
+from .rows import Choice, Place, Rows, array_of, select_all
 from .standard_messages import GUARDS, Definitions, short_name
 from .walk import Walk
 
+#: What a walk finds in place of a string.
+_INDEX = "uint32"
 _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 
 
@@ -26,7 +28,7 @@ class Pick:
     "xyzw" or "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
     geometry_msgs/Quaternion needs none. `rotation`: 3x3 row by row, from the axes of the sensor into those of its body,
     before the change of axes. `scale`, `offset`: none, one, or one per scalar; applied last. `null_refused`: a
-    quaternion of length zero is no value.
+    quaternion of length zero is no value. `choices`: the value is the index of what the message has (rows.Choice).
     """
 
     name: str
@@ -40,6 +42,7 @@ class Pick:
     scale: tuple[float, ...] = ()
     offset: tuple[float, ...] = ()
     null_refused: bool = False
+    choices: tuple[Choice, ...] = ()
 
 
 def has_stamp(definitions: Definitions, message: str) -> bool:
@@ -66,8 +69,27 @@ def reader_conversion(
     wanted = [piece for selection in selections for piece in selection.pieces]
     wanted += [*stamps, *(piece for found in guards for piece, _ in found)]
     strings = {"header.frame_id": frame, "child_frame_id": child_frame}
-    walk = Walk(definitions, message, wanted, {path: text for path, text in strings.items() if text})
-    return _conversion(walk, picks, selections, guards, stamps)
+    texts = {
+        selection.pieces[0].path: tuple(map(str, pick.choices))
+        for pick, selection in zip(picks, selections, strict=True)
+        if selection.kind is Kind.TEXT
+    }
+    limited = _limited(picks, selections)
+    walk = Walk(definitions, message, wanted, {path: text for path, text in strings.items() if text}, texts, limited)
+    return _conversion(walk, picks, selections, guards, stamps, limited)
+
+
+def _limited(picks: Sequence[Pick], selections: Sequence[Selection]) -> frozenset[str]:
+    """The sequences that may be shorter than their values, because another value is their length."""
+    lengths = {piece.path for selection in selections for piece in selection.pieces if piece.length}
+    limited = set()
+    for pick, selection in zip(picks, selections, strict=True):
+        for piece in selection.pieces:
+            if f"{piece.path}.{LENGTH}" in lengths and piece.element is None:
+                if pick.axes or pick.source_axes or pick.rotation or pick.order or len(selection.pieces) > 1:
+                    raise ConversionError(f"`{pick.name}`: a list with a `.{LENGTH}` beside it is taken as it is")
+                limited.add(piece.path)
+    return frozenset(limited)
 
 
 def _conversion(
@@ -76,10 +98,12 @@ def _conversion(
     selections: Sequence[Selection],
     guards: Sequence[Sequence[tuple[Piece, float]]],
     stamps: Sequence[Piece],
+    limited: frozenset[str],
 ) -> ReaderConversion:
     rows, at, align = Rows(), 0, 1
     values: list[Value] = []
     all_guards: list[Guard] = []
+    choices: list[int] = []
     for pick, selection, found in zip(picks, selections, guards, strict=True):
         type_ = MEMORY[pick.type]
         size = SIZES[type_]
@@ -90,7 +114,16 @@ def _conversion(
         rows.add(_matrix(pick, selection), sources, targets, pick.scale, pick.offset)
         row_count = len(rows.rows) - first
         rotation = pick.null_refused and _is_rotation(pick, selection)
-        values.append(Value(at, size * pick.count, first, row_count, len(all_guards), len(found), rotation))
+        is_limited = any(piece.path in limited for piece in selection.pieces)
+        numbers = [choice for choice in pick.choices if isinstance(choice, int)]
+        first_choice = len(choices) if numbers else NONE
+        values.append(
+            Value(
+                *(at, size * pick.count, first, row_count, len(all_guards), len(found), rotation),
+                *(is_limited, first_choice, len(pick.choices)),
+            )
+        )
+        choices += numbers
         all_guards += [Guard(_places(walk, piece)[0].term(), value) for piece, value in found]
         at += size * pick.count
     stamp_anchor, stamp_offset = walk.places[stamps[0]] if stamps else (NONE, 0)
@@ -102,6 +135,7 @@ def _conversion(
         rows=rows.rows,
         terms=rows.terms,
         guards=all_guards,
+        choices=choices,
         anchor_count=walk.anchor_count,
         size=_aligned(at, align),
         stamp_anchor=stamp_anchor,
@@ -114,13 +148,13 @@ def _aligned(at: int, size: int) -> int:
 
 
 def _places(walk: Walk, piece: Piece) -> list[Place]:
-    return array_of(*walk.places[piece], WIRE[piece.type], piece.count)
+    return array_of(*walk.places[piece], WIRE[_INDEX if piece.type == "string" else piece.type], piece.count)
 
 
 def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
     """The numbers that the pick selects, with their kind; checks the pick's own options."""
     try:
-        selection = select_all(definitions, message, pick.fields, pick.count)
+        selection = select_all(definitions, message, pick.fields, pick.count, pick.choices)
     except ConversionError as error:
         raise ConversionError(f"`{pick.name}`: {error}") from None
     for what, numbers in (("scale", pick.scale), ("offset", pick.offset)):

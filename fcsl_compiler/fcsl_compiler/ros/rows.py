@@ -15,6 +15,10 @@ from .standard_messages import STANDARD, Definitions
 _SCALARS = {"bool": "bool", "uint32": "u32", "int64": "i64", "uint64": "u64", "float32": "f32", "float64": "f64"}
 
 
+#: What an index stands for: a text of a string, or a number.
+Choice = str | int
+
+
 @dataclass(frozen=True)
 class Place:
     """A number to read: type `type` (fcsl_ros_scalar_t), `offset` bytes from anchor (or memory) number `anchor`."""
@@ -75,9 +79,15 @@ def array_of(anchor: int, offset: int, type_: int, count: int) -> list[Place]:
     return [Place(anchor, offset + i * SIZES[type_], type_) for i in range(count)]
 
 
-def select_all(definitions: Definitions, message: str, fields: Sequence[str], count: int) -> Selection:
-    """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises ConversionError."""
+def select_all(
+    definitions: Definitions, message: str, fields: Sequence[str], count: int, choices: Sequence[Choice] = ()
+) -> Selection:
+    """The `count` numbers that several fields select together. A whole sequence takes all of them. A string has
+    `choices`. Raises ConversionError."""
     found = _each(definitions, message, fields)
+    for field, selection in zip(fields, found, strict=True):
+        if selection.kind is Kind.TEXT and not choices:
+            raise ConversionError(f"`{field}` is text, not a number; a channel carries numbers and bools")
     pieces = tuple(piece for selection in found for piece in selection.pieces)
     kind = found[0].kind if len(found) == 1 else Kind.NUMBERS
     if len(pieces) == 1 and pieces[0].count == 0:
@@ -97,6 +107,8 @@ def scalars_of(definitions: Definitions, message: str, fields: Sequence[str]) ->
     for field, selection in zip(fields, found, strict=True):
         if not selection.count:
             raise ConversionError(f"the length of `{field}` differs from message to message; take one: {field}[0]")
+        if selection.kind is Kind.TEXT:
+            raise ConversionError(f"`{field}` is text, not a number")
     types = {_SCALARS.get(piece.type, "i32") for selection in found for piece in selection.pieces}
     return types.pop() if len(types) == 1 else "f64", sum(selection.count for selection in found)
 

@@ -30,6 +30,10 @@ SIZES: dict[str, int] = {
 }
 
 
+#: A constant or a default of a message.
+Constant = int | float | str
+
+
 @dataclass(frozen=True)
 class Member:
     """One member of a message. Its type is a number, a string or a message (full name). It is a single value, an array
@@ -40,6 +44,9 @@ class Member:
     count: int = 0  # length of a fixed array; 0 for a single value or a sequence
     sequence: bool = False
     unit: str = ""  # unit of each number in it, if the message's documentation gives one
+    bound: int = 0  # most elements of a sequence; 0: any number
+    text_bound: int = 0  # most characters of a string; 0: any number
+    default: tuple[Constant, ...] = ()  # what the definition says of each element; (): zero, or empty
 
     @property
     def is_array(self) -> bool:
@@ -244,6 +251,32 @@ _MAPPABLE = _supported()
 SUPPORTED: tuple[str, ...] = tuple(sorted(_MAPPABLE))
 #: Definitions of these messages and of all messages they contain.
 STANDARD: Definitions = {**_read(_PARTS), **_MAPPABLE}
+
+
+#: Constants: a prefix, the value of the first name, and names of consecutive values.
+_CONSTANTS: dict[str, tuple[tuple[str, int, str], ...]] = {
+    "sensor_msgs/BatteryState": (
+        ("POWER_SUPPLY_STATUS_", 0, "UNKNOWN CHARGING DISCHARGING NOT_CHARGING FULL"),
+        ("POWER_SUPPLY_HEALTH_", 0, "UNKNOWN GOOD OVERHEAT DEAD OVERVOLTAGE UNSPEC_FAILURE COLD"),
+        ("POWER_SUPPLY_HEALTH_", 7, "WATCHDOG_TIMER_EXPIRE SAFETY_TIMER_EXPIRE"),
+        ("POWER_SUPPLY_TECHNOLOGY_", 0, "UNKNOWN NIMH LION LIPO LIFE NICD LIMN TERNARY VRLA"),
+    ),
+    "sensor_msgs/NavSatFix": (("COVARIANCE_TYPE_", 0, "UNKNOWN APPROXIMATED DIAGONAL_KNOWN KNOWN"),),
+    "sensor_msgs/NavSatStatus": (
+        ("STATUS_", -2, "UNKNOWN NO_FIX FIX SBAS_FIX GBAS_FIX"),
+        ("SERVICE_", 0, "UNKNOWN GPS GLONASS"),
+        ("SERVICE_", 4, "COMPASS"),
+        ("SERVICE_", 8, "GALILEO"),
+    ),
+    "sensor_msgs/Range": (("", 0, "ULTRASOUND INFRARED"),),
+}
+#: The constants of these messages, by name.
+CONSTANTS: dict[str, dict[str, Constant]] = {
+    full_name(message): {
+        prefix + name: first + i for prefix, first, names in rows for i, name in enumerate(names.split())
+    }
+    for message, rows in _CONSTANTS.items()
+}
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,33 @@
 """A message definition as the steps of a walk through its bytes, with the places of the selected numbers.
 
 Members at known distances form one block. A sequence of messages is unrolled as far as elements of it are selected; the
-rest is a loop.
+rest is a loop. An element that is found by its key has a loop of its own before, from which the walk returns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
-from .conversion import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, ConversionError, Part, SequencePick
-from .message_fields import Piece
+from .conversion import (
+    BLOCK,
+    CHOICE,
+    COUNT,
+    END,
+    FIND,
+    FOUND,
+    KEY,
+    LENGTH,
+    NAMES,
+    NONE,
+    REPEAT,
+    SEQUENCE,
+    STRING,
+    ConversionError,
+    Part,
+    SequencePick,
+)
+from .message_fields import Piece, key_of, length_of
 from .standard_messages import SIZES, Definitions, Member, short_name
 
 #: Limits of ros_walk.h.
@@ -23,8 +41,17 @@ _MAX_MEMBERS = 1 << 18
 class Walk:
     """The parts, picks and names of a conversion, and the anchor and offset of each selected piece (`places`)."""
 
-    def __init__(self, definitions: Definitions, message: str, pieces: Iterable[Piece], strings: Mapping[str, str]):
-        """`strings`: path of a string to its required value. Raises ConversionError for a message that cannot be walked."""
+    def __init__(
+        self,
+        definitions: Definitions,
+        message: str,
+        pieces: Iterable[Piece],
+        strings: Mapping[str, str],
+        choices: Mapping[str, Sequence[str]] = MappingProxyType({}),
+        limited: frozenset[str] = frozenset(),
+    ):
+        """`strings`: path of a string to its required value; `choices`: to those of which it has the index. `limited`:
+        sequences that may be shorter than their piece. Raises ConversionError for a message that cannot be walked."""
         self.parts: list[Part] = []
         self.picks: list[SequencePick] = []
         self.names: list[bytes] = []
@@ -32,6 +59,8 @@ class Walk:
         self.anchor_count = 0
         self._member_count = 0
         self._definitions, self._message, self._strings = definitions, message, strings
+        self._choices, self._limited = choices, limited
+        self._key = ""  # path of the string that is the key, in a loop that finds an element
         self._wanted: dict[str, list[Piece]] = {}
         self._elements: dict[tuple[str, str], int] = {}  # path of a sequence of names, and a name: its index in `names`
         self._block: Part | None = None
@@ -76,7 +105,7 @@ class Walk:
                 self._sequence_of_strings(path)
             else:
                 for _ in range(max(1, member.count)):
-                    self._part(STRING, first=self._expected(path))
+                    self._string(path)
         elif member.type not in self._definitions:
             raise self._error(path or member.name, f"is a {member.type}, which cannot be walked over")
         elif member.sequence:
@@ -100,6 +129,18 @@ class Walk:
             return NONE
         self._met.add(path)
         return self._name(self._strings[path])
+
+    def _string(self, path: str | None) -> None:
+        if path is not None and path == self._key:
+            self._part(KEY, first=self._name(key_of(path.rpartition("[")[2].partition("]")[0])[1]))
+        elif path is not None and path in self._choices and path in self._wanted:
+            names = self._choices[path]
+            first, anchor = len(self.names), self._new_anchor()
+            self.names += [text.encode() for text in names]
+            self.places |= dict.fromkeys(self._wanted[path], (anchor, 0))
+            self._part(CHOICE, size=anchor, first=first, count=len(names))
+        else:
+            self._part(STRING, first=self._expected(path))
 
     def _numbers(self, member: Member, path: str | None) -> None:
         """A number or a fixed array: in the open block, if its offset there is known."""
@@ -128,9 +169,21 @@ class Walk:
                 name = self._elements.get((f"{names}.name" if names else "name", piece.element), NONE)
                 if name == NONE:
                     raise self._error(path or "", "stands before the names of its elements")
-            element = piece.element if isinstance(piece.element, int) else 0
-            self.picks.append(SequencePick(anchor, piece.count if piece.element is None else 0, element, name))
+            whole = piece.element is None
+            element = piece.element if isinstance(piece.element, int) else int(whole and path in self._limited)
+            self.picks.append(SequencePick(anchor, piece.count if whole else 0, element, name))
+        length = self._length(path)
+        if length != NONE:
+            self.picks.append(SequencePick(length, 0, LENGTH, NONE))
         self._part(SEQUENCE, align=size, size=size, first=first, count=len(self.picks) - first)
+
+    def _length(self, path: str | None) -> int:
+        """A new anchor for the length of a sequence, if it is selected; else NONE."""
+        piece = length_of(path or "")
+        if path is None or piece not in self._wanted.get(piece.path, ()):
+            return NONE
+        self.places[piece] = (self._new_anchor(), 0)
+        return self.places[piece][0]
 
     def _sequence_of_strings(self, path: str | None) -> None:
         """Names of the elements of parallel sequences, where such elements are selected."""
@@ -150,9 +203,11 @@ class Walk:
     def _sequence_of_messages(self, member: Member, path: str | None, depth: int) -> None:
         spelled = 0
         if path is not None:
-            inside = [p[len(path) + 1 :] for p in self._wanted if p.startswith(path + "[")]
-            spelled = max((int(p.partition("]")[0]) + 1 for p in inside), default=0)
-        self._part(COUNT, count=spelled)
+            inside = [p[len(path) + 1 :].partition("]")[0] for p in self._wanted if p.startswith(path + "[")]
+            spelled = max((int(index) + 1 for index in inside if index.isdigit()), default=0)
+            for index in dict.fromkeys(index for index in inside if not index.isdigit()):
+                self._by_key(member, f"{path}[{index}].", index, depth)
+        self._part(COUNT, first=self._length(path), count=spelled)
         for i in range(spelled):
             self._members(member.type, f"{path}[{i}].", depth + 1)
         at = len(self.parts)
@@ -160,3 +215,13 @@ class Walk:
         self._members(member.type, None, depth + 1)
         repeat.first = len(self.parts)
         self._part(END, first=at)
+
+    def _by_key(self, member: Member, prefix: str, index: str, depth: int) -> None:
+        """Goes through the elements up to the one whose string is that of the key, and back to the first."""
+        at, first = len(self.parts), self.anchor_count
+        find = self._part(FIND)
+        self._key = f"{prefix}{key_of(index)[0]}"
+        self._members(member.type, prefix, depth + 1)
+        self._key = ""
+        find.first, find.size, find.count = len(self.parts), first, self.anchor_count - first
+        self._part(FOUND, first=at)

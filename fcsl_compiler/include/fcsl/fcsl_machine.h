@@ -194,6 +194,7 @@ typedef struct {
 typedef struct {
     const char *topic; /* "imu/data", relative to the namespace of the node */
     const char *type; /* "sensor_msgs/msg/Imu" */
+    const char *type_hash; /* of the definition at build time: "RIHS01_" and 64 hex digits */
     uint8_t direction; /* fcsl_direction_t, of all its channels */
     const uint32_t *channels; /* indices into channels */
     uint32_t channel_count;

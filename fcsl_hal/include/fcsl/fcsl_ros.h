@@ -48,7 +48,9 @@ typedef enum {
     FCSL_ROS_FUTURE = 11,   /* stamped more than FCSL_ROS_AHEAD_NS ahead of now */
     FCSL_ROS_OLDER = 12,    /* stamped before the last one taken */
     FCSL_ROS_REPEATED = 13, /* stamped as the last one taken */
-    FCSL_ROS_STATUSES = 14
+    /* of a value */
+    FCSL_ROS_UNKNOWN = 14, /* a string or a number that is none of the choices */
+    FCSL_ROS_STATUSES = 15
 } fcsl_ros_status_t;
 
 typedef struct fcsl_ros_reader fcsl_ros_reader_t;
@@ -78,10 +80,11 @@ typedef struct fcsl_ros_composer fcsl_ros_composer_t;
 fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *conversion, fcsl_error_t *error);
 void fcsl_ros_composer_free(fcsl_ros_composer_t *composer);
 
-/* Writes the message, all of the conversion's `size` bytes. Its terms read from `memories`, which the caller vouches for.
- * FCSL_ROS_RANGE or _NAN: a number that its field cannot hold; FCSL_ROS_STAMP: a time that a stamp cannot hold. */
+/* Writes the message; `size` gets its bytes, at most the conversion's. Its terms read from `memories`, which the caller
+ * vouches for. FCSL_ROS_RANGE or _NAN: a number that its field cannot hold, or a length beyond the list; FCSL_ROS_UNKNOWN: an
+ * index of no choice; FCSL_ROS_STAMP: a time that a stamp cannot hold. */
 fcsl_ros_status_t fcsl_ros_compose(const fcsl_ros_composer_t *composer, const uint8_t *const *memories, int64_t time_ns,
-                                   uint8_t *cdr);
+                                   uint8_t *cdr, uint32_t *size);
 
 #ifdef __cplusplus
 }

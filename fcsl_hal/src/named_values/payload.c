@@ -125,8 +125,7 @@ int payload_write(const payload_t *payload, uint32_t channel, const uint8_t *dat
     const fcsl_field_t *field = field_of(machine, channel);
     uint32_t head = 0;
     if (payload->composers != NULL) {
-        head = machine->payloads[channel].composer->size;
-        if (fcsl_ros_compose(payload->composers[channel], &data, time_ns, bytes) != FCSL_ROS_TAKEN) {
+        if (fcsl_ros_compose(payload->composers[channel], &data, time_ns, bytes, &head) != FCSL_ROS_TAKEN) {
             return -1;
         }
     }

@@ -7,6 +7,7 @@
 
 #include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_ros.h"
+#include "fcsl/fcsl_scalar.h"
 #include "ros_number.h"
 #include "ros_walk.h"
 
@@ -20,35 +21,89 @@ static int range_fits(uint32_t first, uint32_t count, uint32_t whole)
     return count <= whole && first <= whole - count;
 }
 
-/* Bytes behind each anchor, from the part or pick that sets it; 0 while nothing does. Fails where two do. */
-static int anchor_sizes(const fcsl_ros_reader_plan_t *conversion, uint32_t *sizes)
+/* What is behind an anchor. */
+typedef struct {
+    uint32_t bytes; /* 0 while no part or pick sets it */
+    uint8_t limited; /* perhaps fewer: only a value that is limited may read them */
+} extent_t;
+
+static int set_extent(extent_t *extents, uint32_t anchor_count, uint32_t anchor, uint32_t bytes, int limited)
 {
-    memset(sizes, 0, conversion->anchor_count * sizeof *sizes);
-    for (uint32_t i = 0; i < conversion->part_count; i++) {
+    if (anchor >= anchor_count || extents[anchor].bytes != 0) {
+        return 0;
+    }
+    extents[anchor] = (extent_t){.bytes = bytes, .limited = (uint8_t)limited};
+    return 1;
+}
+
+/* What is behind each anchor. Fails where two parts or picks set one. */
+static int find_extents(const fcsl_ros_reader_plan_t *conversion, extent_t *extents)
+{
+    const uint32_t anchors = conversion->anchor_count;
+    int valid = 1;
+    memset(extents, 0, anchors * sizeof *extents);
+    for (uint32_t i = 0; i < conversion->part_count && valid; i++) {
         const fcsl_ros_part_t *part = &conversion->parts[i];
-        if (part->code == FCSL_ROS_BLOCK && part->first != FCSL_ROS_NONE) {
-            if (part->first >= conversion->anchor_count || sizes[part->first] != 0) {
-                return 0;
-            }
-            sizes[part->first] = part->size;
+        if ((part->code == FCSL_ROS_BLOCK || part->code == FCSL_ROS_COUNT) && part->first != FCSL_ROS_NONE) {
+            const uint32_t bytes = part->code == FCSL_ROS_BLOCK ? part->size : (uint32_t)sizeof(uint32_t);
+            valid = set_extent(extents, anchors, part->first, bytes, 0);
+        } else if (part->code == FCSL_ROS_CHOICE) {
+            valid = set_extent(extents, anchors, part->size, sizeof(uint32_t), 0);
         }
-        for (uint32_t j = 0; part->code == FCSL_ROS_SEQUENCE && j < part->count; j++) {
+        for (uint32_t j = 0; part->code == FCSL_ROS_SEQUENCE && j < part->count && valid; j++) {
             const fcsl_ros_pick_t *pick = &conversion->picks[part->first + j];
-            if (pick->anchor >= conversion->anchor_count || sizes[pick->anchor] != 0) {
+            const uint32_t bytes = fcsl_ros_pick_is_length(pick) ? (uint32_t)sizeof(uint32_t)
+                                                                 : (pick->count > 0 ? pick->count : 1u) * part->size;
+            valid = set_extent(extents, anchors, pick->anchor, bytes, fcsl_ros_pick_is_limited(pick));
+        }
+    }
+    return valid;
+}
+
+/* Whether `count` numbers of a term lie behind its anchor. */
+static int term_valid(const fcsl_ros_term_t *term, uint32_t count, const extent_t *extents, uint32_t anchor_count)
+{
+    const uint64_t bytes = (uint64_t)count * fcsl_ros_scalar_size(term->type);
+    return bytes > 0 && bytes <= UINT32_MAX && term->anchor < anchor_count &&
+           range_fits(term->offset, (uint32_t)bytes, extents[term->anchor].bytes);
+}
+
+/* Whether the rows of each value read what is always there, or of a limited one the only numbers that are perhaps not. */
+static int limits_valid(const fcsl_ros_reader_plan_t *conversion, const extent_t *extents)
+{
+    for (uint32_t i = 0; i < conversion->value_count; i++) {
+        const fcsl_ros_value_t *value = &conversion->values[i];
+        for (uint32_t j = 0; j < value->row_count; j++) {
+            const fcsl_ros_row_t *row = &conversion->rows[value->first_row + j];
+            if (value->limited != 0u && row->term_count != 1u) {
                 return 0;
             }
-            sizes[pick->anchor] = (pick->count > 0 ? pick->count : 1u) * part->size;
+            for (uint32_t k = 0; k < row->term_count; k++) {
+                const fcsl_ros_term_t *term = &conversion->terms[row->first_term + k];
+                if (extents[term->anchor].limited != value->limited) {
+                    return 0;
+                }
+            }
         }
     }
     return 1;
 }
 
-/* Whether `count` numbers of a term lie behind its anchor. */
-static int term_valid(const fcsl_ros_term_t *term, uint32_t count, const uint32_t *sizes, uint32_t anchor_count)
+/* A choice is of integers, each a u32 or an i32 of the row. */
+static int choices_valid(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_value_t *value)
 {
-    const uint64_t bytes = (uint64_t)count * fcsl_ros_scalar_size(term->type);
-    return bytes > 0 && bytes <= UINT32_MAX && term->anchor < anchor_count &&
-           range_fits(term->offset, (uint32_t)bytes, sizes[term->anchor]);
+    if (value->choice_count == 0u) {
+        return 1;
+    }
+    for (uint32_t i = 0; i < value->row_count; i++) {
+        const uint8_t type = conversion->rows[value->first_row + i].type;
+        if (type != FCSL_ROS_I32 && type != FCSL_ROS_U32) {
+            return 0;
+        }
+    }
+    return value->size % sizeof(uint32_t) == 0 &&
+           (value->first_choice == FCSL_ROS_NONE ||
+            range_fits(value->first_choice, value->choice_count, conversion->choice_count));
 }
 
 static int values_valid(const fcsl_ros_reader_plan_t *conversion)
@@ -57,7 +112,7 @@ static int values_valid(const fcsl_ros_reader_plan_t *conversion)
         const fcsl_ros_value_t *value = &conversion->values[i];
         if (!range_fits(value->offset, value->size, conversion->size) ||
             !range_fits(value->first_row, value->row_count, conversion->row_count) ||
-            !range_fits(value->first_guard, value->guard_count, conversion->guard_count)) {
+            !range_fits(value->first_guard, value->guard_count, conversion->guard_count) || value->limited > 1u) {
             return 0;
         }
     }
@@ -67,26 +122,34 @@ static int values_valid(const fcsl_ros_reader_plan_t *conversion)
 /* Whether every number that valid rows and the guards read lies behind an anchor that the walk sets. */
 static int reads_valid(const fcsl_ros_reader_plan_t *conversion)
 {
-    uint32_t sizes[FCSL_ROS_ANCHORS_MAX];
-    if (conversion->anchor_count > FCSL_ROS_ANCHORS_MAX || !anchor_sizes(conversion, sizes)) {
+    extent_t extents[FCSL_ROS_ANCHORS_MAX];
+    if (conversion->anchor_count > FCSL_ROS_ANCHORS_MAX || !find_extents(conversion, extents)) {
         return 0;
     }
     for (uint32_t i = 0; i < conversion->row_count; i++) {
         const fcsl_ros_row_t *row = &conversion->rows[i];
         for (uint32_t j = 0; j < row->term_count; j++) {
-            if (!term_valid(&conversion->terms[row->first_term + j], row->more + 1u, sizes, conversion->anchor_count)) {
+            if (!term_valid(&conversion->terms[row->first_term + j], row->more + 1u, extents,
+                            conversion->anchor_count)) {
                 return 0;
             }
         }
     }
     for (uint32_t i = 0; i < conversion->guard_count; i++) {
-        if (!term_valid(&conversion->guards[i].at, 1, sizes, conversion->anchor_count)) {
+        const fcsl_ros_term_t *at = &conversion->guards[i].at;
+        if (!term_valid(at, 1, extents, conversion->anchor_count) || extents[at->anchor].limited) {
             return 0;
         }
     }
-    return conversion->stamp_anchor == FCSL_ROS_NONE ||
-           (conversion->stamp_anchor < conversion->anchor_count &&
-            range_fits(conversion->stamp_offset, 8u, sizes[conversion->stamp_anchor]));
+    for (uint32_t i = 0; i < conversion->value_count; i++) {
+        if (!choices_valid(conversion, &conversion->values[i])) {
+            return 0;
+        }
+    }
+    return limits_valid(conversion, extents) &&
+           (conversion->stamp_anchor == FCSL_ROS_NONE ||
+            (conversion->stamp_anchor < conversion->anchor_count && !extents[conversion->stamp_anchor].limited &&
+             range_fits(conversion->stamp_offset, 8u, extents[conversion->stamp_anchor].bytes)));
 }
 
 fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *conversion, fcsl_error_t *error)
@@ -154,6 +217,47 @@ static int is_null(const fcsl_ros_value_t *value, uint8_t type, const uint8_t *r
     return bits == 0u;
 }
 
+/* The part of a row that a sequence of perhaps fewer numbers has. Returns 0 where there is none. */
+static int cut_row(const fcsl_ros_reader_t *reader, fcsl_ros_row_t *row)
+{
+    const fcsl_ros_term_t *term = &reader->conversion->terms[row->first_term];
+    const uint32_t first = term->offset / fcsl_ros_scalar_size(term->type);
+    if (reader->walk.anchors[term->anchor] == NULL) {
+        return 1; /* refused when it is read */
+    }
+    if (reader->walk.lengths[term->anchor] <= first) {
+        return 0;
+    }
+    const uint32_t more = reader->walk.lengths[term->anchor] - first - 1u;
+    row->more = more < row->more ? more : row->more;
+    return 1;
+}
+
+/* Turns the numbers of a value into indices of choices. */
+static fcsl_ros_status_t choose(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_value_t *value, uint8_t *row)
+{
+    const int is_signed = conversion->rows[value->first_row].type == FCSL_ROS_I32;
+    for (uint32_t at = value->offset; at < value->offset + value->size; at += (uint32_t)sizeof(uint32_t)) {
+        const uint32_t bits = fcsl_get_u32(row + at);
+        const int64_t number = is_signed ? (int64_t)(int32_t)bits : (int64_t)bits;
+        uint32_t index = value->choice_count;
+        if (value->first_choice == FCSL_ROS_NONE) {
+            index = number >= 0 && number < (int64_t)value->choice_count ? (uint32_t)number : index;
+        } else {
+            for (index = 0; index < value->choice_count; index++) {
+                if (conversion->choices[value->first_choice + index] == number) {
+                    break;
+                }
+            }
+        }
+        if (index == value->choice_count) {
+            return FCSL_ROS_UNKNOWN;
+        }
+        fcsl_put_u32(row + at, index);
+    }
+    return FCSL_ROS_TAKEN;
+}
+
 static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_ros_value_t *value, uint8_t *row)
 {
     const fcsl_ros_reader_plan_t *conversion = reader->conversion;
@@ -163,9 +267,19 @@ static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_
         }
     }
     for (uint32_t i = 0; i < value->row_count; i++) {
-        const fcsl_ros_row_t *number = &conversion->rows[value->first_row + i];
+        fcsl_ros_row_t number = conversion->rows[value->first_row + i];
+        if (value->limited != 0u && !cut_row(reader, &number)) {
+            continue;
+        }
         const fcsl_ros_status_t status =
-            fcsl_ros_row_apply(number, conversion->terms, reader->walk.anchors, conversion->nan_allowed, row);
+            fcsl_ros_row_apply(&number, conversion->terms, reader->walk.anchors, conversion->nan_allowed, row);
+        if (status != FCSL_ROS_TAKEN) {
+            memset(row + value->offset, 0, value->size);
+            return status;
+        }
+    }
+    if (value->choice_count > 0u && value->row_count > 0u) {
+        const fcsl_ros_status_t status = choose(conversion, value, row);
         if (status != FCSL_ROS_TAKEN) {
             memset(row + value->offset, 0, value->size);
             return status;

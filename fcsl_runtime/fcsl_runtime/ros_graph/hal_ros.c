@@ -13,7 +13,6 @@
 #include "fcsl/fcsl_error.h"
 #include "endpoint.h"
 #include "fcsl/fcsl_sample_input.h"
-#include "type_hashes.h"
 
 enum {
     MESSAGE_BYTES = 65536, /* of the longest sensor message that is taken */
@@ -54,6 +53,7 @@ static const fcsl_field_t FIELDS[] = {
     REFUSED("nan", FCSL_ROS_NAN, "values that are NaN"),
     REFUSED("unmeasured", FCSL_ROS_UNMEASURED, "values that the message marks as not measured"),
     REFUSED("rotation", FCSL_ROS_ROTATION, "quaternions of length zero"),
+    REFUSED("unknown", FCSL_ROS_UNKNOWN, "strings and numbers that are none of the choices"),
     REFUSED("future", FCSL_ROS_FUTURE, "messages stamped more than 50 ms ahead of now"),
     REFUSED("older", FCSL_ROS_OLDER, "messages stamped before the last one"),
     REFUSED("repeated", FCSL_ROS_REPEATED, "messages stamped as the last one"),
@@ -69,7 +69,7 @@ typedef struct {
 
 typedef struct {
     fcsl_ros_composer_t *composer;
-    uint32_t size;
+    uint32_t size; /* of the longest message */
     uint8_t direction; /* FCSL_ACTUATOR, FCSL_REPORT */
 } output_t;
 
@@ -120,10 +120,11 @@ static void post(hal_t *hal, uint8_t direction, const uint8_t *memory)
         if (output->direction != direction) {
             continue;
         }
-        if (fcsl_ros_compose(output->composer, &memory, hal->now_ns, hal->message) != FCSL_ROS_TAKEN) {
+        uint32_t size = 0;
+        if (fcsl_ros_compose(output->composer, &memory, hal->now_ns, hal->message, &size) != FCSL_ROS_TAKEN) {
             hal->counters.commands_refused++;
         } else if (fcsl_bus_matched(hal->bus, i)) {
-            const int dropped = fcsl_bus_post(hal->bus, i, hal->message, output->size) != 0;
+            const int dropped = fcsl_bus_post(hal->bus, i, hal->message, size) != 0;
             hal->counters.commands += dropped ? 0u : 1u;
             hal->counters.commands_dropped += dropped ? 1u : 0u;
         }
@@ -219,13 +220,10 @@ static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
         const int is_sensor = message->direction == FCSL_SENSOR;
         const ros_quality_t quality = {.kind = is_sensor ? ROS_SUBSCRIPTION : ROS_PUBLISHER,
                                        .type = message->type,
-                                       .hash = ros_type_hash(message->type),
+                                       .hash = message->type_hash,
                                        .reliable = !is_sensor,
                                        .depth = DEPTH};
         names_t *at = &names[places[is_sensor]++];
-        if (quality.hash == NULL) {
-            return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
-        }
         if (ros_key_write(at->key, hal->name_space, NULL, message->topic, error) != 0 ||
             ros_token_write(at->token, at->key, &quality, error) != 0) {
             return -1;

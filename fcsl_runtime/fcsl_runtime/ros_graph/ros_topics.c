@@ -13,7 +13,6 @@
 #include "messages/schema.h"
 #include "messages/type_hash.h"
 #include "machine/fault_place.h"
-#include "type_hashes.h"
 
 enum {
     /* Encapsulation, stamp, empty frame_id and tick: in these alone do latched messages of the same content differ. */
@@ -133,7 +132,7 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
     ros_topic_t *topic = &topics->topics[topics->count++];
     const ros_quality_t quality = {.kind = ROS_PUBLISHER,
                                    .type = message->type,
-                                   .hash = ros_type_hash(message->type),
+                                   .hash = message->type_hash,
                                    .reliable = 1,
                                    .depth = message->direction == FCSL_SENSOR ? DEPTH_STREAM : DEPTH_COMMAND};
     topic->kind = ROS_MAPPED;
@@ -142,9 +141,6 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
     topic->composer = fcsl_ros_composer_new(message->composer, &reason);
     if (topic->composer == NULL) {
         return fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
-    }
-    if (quality.hash == NULL) {
-        return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
     }
     return ros_key_write(topic->key, name_space, NULL, message->topic, error) != 0
                ? -1
@@ -246,11 +242,12 @@ static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const
     }
     const int is_armed = !tick->requires_arming && fcsl_is_armed(machine, data);
     const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
-    if (fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) != FCSL_ROS_TAKEN) {
+    uint32_t size = 0;
+    if (fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes, &size) != FCSL_ROS_TAKEN) {
         atomic_fetch_add_explicit(&topics->refused, 1, memory_order_relaxed);
         return 0;
     }
-    return topic->longest;
+    return size;
 }
 
 size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const published_tick_t *tick, fcsl_stamp_t stamp,

@@ -51,7 +51,7 @@ static const fcsl_ros_row_t ROWS[] = {
     {4, 1, 36, FCSL_ROS_I32, 1, 0.5, 1.0, 0},
 };
 static const fcsl_ros_value_t ROW_VALUES[VALUES] = {
-    {0, 8, 0, 1, 0, 0, 0}, {8, 24, 1, 2, 0, 0, 0}, {32, 8, 3, 2, 0, 0, 0}};
+    {0, 8, 0, 1, 0, 0, 0, 0, 0, 0}, {8, 24, 1, 2, 0, 0, 0, 0, 0, 0}, {32, 8, 3, 2, 0, 0, 0, 0, 0, 0}};
 
 #define COUNT_OF(table) ((uint32_t)(sizeof(table) / sizeof(table)[0]))
 static const fcsl_ros_reader_plan_t CONVERSION = {

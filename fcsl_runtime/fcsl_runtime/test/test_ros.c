@@ -217,7 +217,7 @@ static void test_sample_input(const char *library)
         {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
     static const fcsl_ros_row_t rows[] = {
         {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
-    static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0, 0}};
+    static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0, 0, 0, 0, 0}};
     const fcsl_ros_reader_plan_t conversion = {.parts = parts,
                                                .picks = picks,
                                                .values = values,
@@ -288,12 +288,14 @@ static void test_composing(void)
     uint8_t out[sizeof text];
     double sum = 0.0;
     counting = 1;
-    CHECK(fcsl_ros_compose(composer, memories, 3000000005, out) == FCSL_ROS_TAKEN);
+    uint32_t size = 0;
+    CHECK(fcsl_ros_compose(composer, memories, 3000000005, out, &size) == FCSL_ROS_TAKEN && size == sizeof text);
     counting = 0;
     memcpy(&sum, out + 12, sizeof sum);
     CHECK(allocations == 0 && sum == -4.5 && out[4] == 3 && out[8] == 5 && out[1] == 1);
-    CHECK(fcsl_ros_compose(composer, memories, -1, out) == FCSL_ROS_STAMP);
-    CHECK(fcsl_ros_compose(composer, memories, (int64_t)INT32_MAX * 1000000000 + 1000000000, out) == FCSL_ROS_STAMP);
+    CHECK(fcsl_ros_compose(composer, memories, -1, out, &size) == FCSL_ROS_STAMP);
+    const int64_t late_ns = (int64_t)INT32_MAX * 1000000000 + 1000000000;
+    CHECK(fcsl_ros_compose(composer, memories, late_ns, out, &size) == FCSL_ROS_STAMP);
     fcsl_ros_composer_free(composer);
     conversion.stamp_offset = 13;
     CHECK(fcsl_ros_composer_new(&conversion, &error) == NULL);
@@ -304,7 +306,8 @@ static void test_composing(void)
     /* Nothing but constants and a stamp: no tables at all. */
     const fcsl_ros_composer_plan_t constant = {.text = text, .size = sizeof text, .stamp_offset = 4};
     composer = fcsl_ros_composer_new(&constant, &error);
-    CHECK(composer != NULL && fcsl_ros_compose(composer, NULL, 7000000000, out) == FCSL_ROS_TAKEN && out[4] == 7);
+    CHECK(composer != NULL && fcsl_ros_compose(composer, NULL, 7000000000, out, &size) == FCSL_ROS_TAKEN &&
+          out[4] == 7);
     fcsl_ros_composer_free(composer);
 }
 

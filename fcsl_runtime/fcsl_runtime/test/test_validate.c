@@ -287,7 +287,8 @@ static void test_ros_messages(void)
     const fcsl_ros_composer_plan_t scattered = {
         .rows = rows, .row_count = 1, .terms = terms, .term_count = 1, .memory_count = 2};
     const fcsl_ros_reader_plan_t reader = {.value_count = 2};
-    const fcsl_ros_message_t message = {"imu", "sensor_msgs/msg/Imu", FCSL_SENSOR, both, 2, &composer, &reader};
+    const fcsl_ros_message_t message = {"imu",  "sensor_msgs/msg/Imu", "RIHS01_0", FCSL_SENSOR, both, 2, &composer,
+                                        &reader};
     fcsl_ros_message_t damaged = message;
     fcsl_error_t error;
     copy_good();
@@ -334,7 +335,8 @@ static void test_payloads(void)
         values[i] = (fcsl_ros_value_t){.size = good->fields[good->channels[i].field].size};
         readers[i] = (fcsl_ros_reader_plan_t){.values = &values[i], .value_count = 1};
         messages[i] = (fcsl_ros_message_t){
-            "", "std_msgs/msg/Float64", good->channels[i].direction, &numbers[i], 1, &composer, &readers[i]};
+            "",         "std_msgs/msg/Float64", "RIHS01_0", good->channels[i].direction, &numbers[i], 1, &composer,
+            &readers[i]};
     }
     copy_good();
     machine.payloads = messages;

@@ -157,6 +157,21 @@ class CEvents(Structure):
     ]
 
 
+class CRosMessage(Structure):
+    """fcsl_ros_message_t; composer and reader as addresses."""
+
+    _fields_ = [
+        ("topic", c_char_p),
+        ("type", c_char_p),
+        ("type_hash", c_char_p),
+        ("direction", c_uint8),
+        ("channels", POINTER(c_uint32)),
+        ("channel_count", c_uint32),
+        ("composer", c_void_p),
+        ("reader", c_void_p),
+    ]
+
+
 class CMachine(Structure):
     _fields_ = [
         ("abi_version", c_uint32),
@@ -185,7 +200,7 @@ class CMachine(Structure):
         ("after_ticks", POINTER(c_uint64)),
         ("channels", POINTER(CChannel)),
         ("channel_count", c_uint32),
-        ("ros_messages", c_void_p),
+        ("ros_messages", POINTER(CRosMessage)),
         ("ros_message_count", c_uint32),
         ("payloads", c_void_p),
         ("arm_field", c_int32),

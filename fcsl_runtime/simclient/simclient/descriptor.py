@@ -132,6 +132,22 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class RosMessage:
+    """A ROS 2 message of channels, by their indices.
+
+    `type` is its full name, `type_hash` that of its definition when the machine was built; `reader` and `composer` are the
+    addresses of its conversions in the machine's library.
+    """
+
+    topic: str
+    type: str
+    type_hash: str
+    channels: tuple[int, ...]
+    reader: int
+    composer: int
+
+
+@dataclass(frozen=True)
 class Transition:
     """A transition between states.
 
@@ -204,6 +220,8 @@ class Machine:
     event_sites: tuple[EventSite, ...] = ()
     #: What plots and viewers show, as JSON text (docs/reference/language.md, views); "" for none.
     views: str = ""
+    #: The messages of mapped channels, by topic.
+    ros_messages: tuple[RosMessage, ...] = ()
     #: Whether it describes only the part of the machine that a telemetry sender sends.
     partial: bool = False
 
@@ -358,6 +376,21 @@ def _read_event_sites(machine: Any) -> tuple[EventSite, ...]:
     )
 
 
+def _read_ros_messages(machine: Any) -> tuple[RosMessage, ...]:
+    raw = [machine.ros_messages[i] for i in range(machine.ros_message_count)]
+    return tuple(
+        RosMessage(
+            topic=_text(m.topic),
+            type=_text(m.type),
+            type_hash=_text(m.type_hash),
+            channels=tuple(m.channels[: m.channel_count]),
+            reader=m.reader,
+            composer=m.composer,
+        )
+        for m in raw
+    )
+
+
 def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
     """The descriptor at `pointer`, whose tables must have been validated (fcsl_run_open does that)."""
     machine = pointer.contents
@@ -379,6 +412,7 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         requests=requests,
         transitions=_read_transitions(machine, states, requests, names),
         channels=_read_channels(machine, fields),
+        ros_messages=_read_ros_messages(machine),
         fault_places=_read_fault_places(machine),
         event_sites=_read_event_sites(machine),
         views=_text(machine.views),

@@ -95,42 +95,6 @@ def run(config: Path) -> Iterator[Run]:
     opened.close()
 
 
-class CompiledMessage(ctypes.Structure):
-    """fcsl_ros_message_t"""
-
-    _fields_ = [
-        ("topic", ctypes.c_char_p),
-        ("type", ctypes.c_char_p),
-        ("direction", ctypes.c_uint8),
-        ("channels", ctypes.POINTER(ctypes.c_uint32)),
-        ("channel_count", ctypes.c_uint32),
-        ("composer", ctypes.POINTER(native.CComposerConversion)),
-        ("reader", ctypes.POINTER(native.CReaderConversion)),
-    ]
-
-
-def compiled_messages(run: Run) -> list[CompiledMessage]:
-    """The messages in the machine's library."""
-    described = run._lib.fcsl_run_machine(run.handle()).contents
-    table = ctypes.cast(described.ros_messages, ctypes.POINTER(CompiledMessage))
-    return [table[i] for i in range(described.ros_message_count)]
-
-
-def contents(conversion: Any) -> dict[str, Any]:
-    """A conversion, or a row of one of its tables, with the tables that it points to."""
-    found: dict[str, Any] = {}
-    for name, kind in conversion._fields_:
-        member = getattr(conversion, name)
-        if hasattr(kind, "contents"):
-            count = conversion.size if name == "text" else getattr(conversion, f"{name[:-1]}_count")
-            member = [member[i] for i in range(count)]
-            member = [contents(row) if isinstance(row, ctypes.Structure) else row for row in member]
-        elif isinstance(member, ctypes.Structure):
-            member = contents(member)
-        found[name] = member
-    return found
-
-
 def value(run: Run, path: str) -> Any:
     field = run.machine.fields[path]
     types = {"f64": "f8", "f32": "f4", "bool": "?", "u32": "u4", "i64": "i8", "i32": "i4"}
@@ -170,19 +134,6 @@ def test_channels_of_a_topic_share_a_message(run: Run) -> None:
         ("thrust", "geometry_msgs/msg/WrenchStamped", "", "actuator", ["thrust.force"]),
         ("mode", "std_msgs/msg/Int8", "", "actuator", ["mode"]),
     ]
-
-
-def test_the_machine_has_the_conversions_of_its_topics(run: Run) -> None:
-    """The compiled conversions are those that Python makes of the descriptor, where the struct is known."""
-    topics = topics_of(run.machine)
-    compiled = compiled_messages(run)
-    assert [(m.topic.decode(), m.type.decode(), m.direction) for m in compiled] == [
-        (t.name, t.type, ("sensor", "actuator").index(t.direction)) for t in topics
-    ]
-    for message, made in zip(compiled, topics, strict=True):
-        assert [message.channels[i] for i in range(message.channel_count)] == [c.index for c in made.channels]
-        assert contents(message.reader.contents) == contents(reader_of(made)._conversion)
-        assert contents(message.composer.contents) == contents(composer_of(made)._conversion)
 
 
 def test_a_message_becomes_samples(run: Run) -> None:

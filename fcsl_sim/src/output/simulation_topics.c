@@ -189,10 +189,11 @@ static int is_sampled(const fcsl_sim_t *sim, const topic_t *topic)
     return 0;
 }
 
-/* Writes the message of this tick; 0 when there is none. */
-static int make(const fcsl_sim_t *sim, const topic_t *topic, uint8_t *bytes)
+/* Writes the message of this tick, of `size` bytes; 0 when there is none. */
+static int make(const fcsl_sim_t *sim, const topic_t *topic, uint8_t *bytes, uint32_t *size)
 {
     const uint8_t **memories = sim->topics->memories;
+    *size = topic->size;
     switch (topic->kind) {
     case CLOCK:
         memcpy(bytes, "\0\1\0\0", STAMP_AT);
@@ -205,11 +206,11 @@ static int make(const fcsl_sim_t *sim, const topic_t *topic, uint8_t *bytes)
         for (uint32_t i = 0; i < topic->count; i++) {
             memories[i] = sim->plant.instances[topic->numbers[i]].data;
         }
-        return fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes) == FCSL_ROS_TAKEN;
+        return fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes, size) == FCSL_ROS_TAKEN;
     default:
         memories[0] = sim->image;
         return is_sampled(sim, topic) &&
-               fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes) == FCSL_ROS_TAKEN;
+               fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes, size) == FCSL_ROS_TAKEN;
     }
 }
 
@@ -218,12 +219,13 @@ void fcsl_sim_topics_put(fcsl_sim_t *sim)
     struct fcsl_sim_topics *all = sim->topics;
     for (uint32_t i = 0; all && i < all->count; i++) {
         const topic_t *topic = &all->topics[i];
-        if (sim->tick % topic->every != 0 || !make(sim, topic, all->scratch)) {
+        uint32_t size = 0;
+        if (sim->tick % topic->every != 0 || !make(sim, topic, all->scratch, &size)) {
             continue;
         }
-        uint8_t *place = fcsl_publish_queue_claim(all->queue, topic->topic, topic->size, FCSL_PUBLISH_QUEUE_STREAM);
+        uint8_t *place = fcsl_publish_queue_claim(all->queue, topic->topic, size, FCSL_PUBLISH_QUEUE_STREAM);
         if (place) {
-            memcpy(place, all->scratch, topic->size);
+            memcpy(place, all->scratch, size);
             fcsl_publish_queue_put(all->queue);
         }
     }

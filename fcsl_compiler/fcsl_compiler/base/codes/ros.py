@@ -23,9 +23,10 @@ def _mapped(rate: str, pressure: str = "") -> str:
 ROS_CODES: dict[str, Code] = {
     "E236": Code(
         "a message that no channel can be mapped to",
-        "`ros` maps a channel to one of the supported standard messages: those of std_msgs, geometry_msgs, "
-        "sensor_msgs and nav_msgs that consist of numbers. All outputs of a machine are also in its own messages, "
-        "one per instance, without any mapping.",
+        "`ros` maps a channel to any message whose definition is standard, installed, or stored beside the machine by "
+        "`fcsl interfaces`. Where it is stored and installed, both must be equal. Refused are messages with an unbounded "
+        "list of bytes (images, point clouds: bulk data), with a wstring, or of more than 65536 bytes: let a node reduce "
+        "them to numbers. All outputs of a machine are also in its own messages, one per instance, without any mapping.",
         Kind.JSON,
         _mapped('"type": "sensor_msgs/IMU", "field": "angular_velocity"'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
@@ -33,9 +34,10 @@ ROS_CODES: dict[str, Code] = {
     "E237": Code(
         "a field that the message does not have",
         "`field` is the path of numbers in the message: one (pose.position.z), a group (angular_velocity), an "
-        "array or one of its elements (axes[1]), a joint of a JointState (position[left_wheel]). Channels cannot "
-        "be mapped to the header or to strings: frames are set by `frame` and `child_frame`, and the stamp is the "
-        "time of the sample or of the tick.",
+        "array or one of its elements (axes[1], poses[2].position), a joint of a JointState (position[left_wheel]), an "
+        "element that is found by a string of it (transforms[child_frame_id=base_link].transform.translation), the "
+        "length of a list (ranges.count), a string with `choices`. Channels cannot be mapped to the header: frames are "
+        "set by `frame` and `child_frame`, and the stamp is the time of the sample or of the tick.",
         Kind.JSON,
         _mapped('"type": "sensor_msgs/Imu", "field": "gyro"'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
@@ -67,5 +69,14 @@ ROS_CODES: dict[str, Code] = {
         Kind.JSON,
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"', "imu.pressure"),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"', "baro.pressure"),
+    ),
+    "E258": Code(
+        "choices that do not fit",
+        "`choices` says what the indices 0, 1, … that the machine has stand for in the message: strings for a string; "
+        "for an integer names of constants of its message, or whole numbers. The value is an i32 or a u32. What comes "
+        "in and is none of them is refused and counted.",
+        Kind.JSON,
+        _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity", "choices": ["x", "y"]'),
+        _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
     ),
 }

@@ -104,8 +104,7 @@ int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tic
 
 int fcsl_topics_add_events(fcsl_topics_t *topics, uint32_t topic, fcsl_error_t *error)
 {
-    const entry_t entry = {
-        .kind = OF_EVENTS, .topic = topic, .next_event = fcsl_run_event_counts(topics->run).told};
+    const entry_t entry = {.kind = OF_EVENTS, .topic = topic, .next_event = fcsl_run_event_counts(topics->run).told};
     return add(topics, &entry, error);
 }
 
@@ -171,9 +170,9 @@ static void put_events(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns)
         const fcsl_stamp_t stamp = {.tick = event.tick, .time_ns = 0};
         const uint32_t bytes =
             (uint32_t)fcsl_event_message(machine, &event, stamp, topics->scratch, FCSL_MESSAGE_BYTES_MAX);
-        uint8_t *place =
-            bytes == 0u ? NULL
-                        : fcsl_publish_queue_claim(topics->queue, entry->topic, bytes, FCSL_PUBLISH_QUEUE_CHANGE);
+        uint8_t *place = bytes == 0u
+                             ? NULL
+                             : fcsl_publish_queue_claim(topics->queue, entry->topic, bytes, FCSL_PUBLISH_QUEUE_CHANGE);
         if (place == NULL) {
             return;
         }
@@ -188,13 +187,14 @@ static void put_channels(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns
 {
     const uint8_t *memory =
         entry->kind == OF_REPORTS ? fcsl_run_data(topics->run) : fcsl_run_actuator_data(topics->run);
-    if (fcsl_ros_compose(entry->composer, &memory, stamp_ns, topics->scratch) != FCSL_ROS_TAKEN) {
+    uint32_t size = 0;
+    if (fcsl_ros_compose(entry->composer, &memory, stamp_ns, topics->scratch, &size) != FCSL_ROS_TAKEN) {
         entry->refused++;
         return;
     }
-    uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, entry->size, FCSL_PUBLISH_QUEUE_STREAM);
+    uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, size, FCSL_PUBLISH_QUEUE_STREAM);
     if (place != NULL) {
-        memcpy(place, topics->scratch, entry->size);
+        memcpy(place, topics->scratch, size);
         fcsl_publish_queue_put(topics->queue);
     }
 }

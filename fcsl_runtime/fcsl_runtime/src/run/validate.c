@@ -171,16 +171,22 @@ static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_compose
             }
         }
     }
+    for (uint32_t i = 0; i < conversion->choice_count; i++) {
+        if (!in_struct(machine, conversion->choices[i].index.offset, sizeof(uint32_t), 1)) {
+            return 0;
+        }
+    }
     return 1;
 }
 
 /* A message's channels are of one direction, and its numbers lie in the struct. Readers and composers check the rest of a conversion. */
 static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, uint32_t value_count)
 {
-    if (message->topic == NULL || !is_name(message->type) || message->channels == NULL || message->channel_count == 0 ||
-        message->channel_count > machine->channel_count || message->composer == NULL ||
-        message->composer->memory_count != 1 || !reads_in_struct(machine, message->composer) ||
-        message->reader == NULL || message->reader->value_count != value_count) {
+    if (message->topic == NULL || !is_name(message->type) || !is_name(message->type_hash) ||
+        message->channels == NULL || message->channel_count == 0 || message->channel_count > machine->channel_count ||
+        message->composer == NULL || message->composer->memory_count != 1 ||
+        !reads_in_struct(machine, message->composer) || message->reader == NULL ||
+        message->reader->value_count != value_count) {
         return -1;
     }
     for (uint32_t i = 0; i < message->channel_count; i++) {

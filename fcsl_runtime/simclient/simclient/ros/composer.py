@@ -33,14 +33,25 @@ class Composer:
             conversion = composer_conversion(definitions, message, sources, frame, child_frame, stamped)
         except ConversionError as error:
             raise MapError(str(error)) from None
+        self._open(native.composer_conversion(conversion))
+
+    @classmethod
+    def compiled(cls, address: int) -> Composer:
+        """By the conversion at an address in a machine's library, which stays loaded."""
+        made = cls.__new__(cls)
+        made._open(native.CComposerConversion.from_address(address))
+        return made
+
+    def _open(self, conversion: native.CComposerConversion) -> None:
         self._memories = (ctypes.c_void_p * conversion.memory_count)()
-        self._conversion = native.composer_conversion(conversion)  # the composer keeps its address
+        self._conversion = conversion  # the composer keeps its address
         library, failure = native.library(), CError()
         handle = library.fcsl_ros_composer_new(byref(self._conversion), byref(failure))
         if not handle:
             raise TwinError(failure.text.decode("utf-8", "replace"))
         self._handle, self._compose = handle, library.fcsl_ros_compose
-        self._message = ctypes.create_string_buffer(len(conversion.text))
+        self._message = ctypes.create_string_buffer(conversion.size)
+        self._size = ctypes.c_uint32()
         #: Messages that were not composed, because a value does not fit its field.
         self.refused = 0
         weakref.finalize(self, library.fcsl_ros_composer_free, handle)
@@ -52,7 +63,7 @@ class Composer:
 
     @property
     def size(self) -> int:
-        """Bytes of each message."""
+        """Bytes of the longest message."""
         return len(self._message)
 
     def compose(self, memories: Sequence[int], time_ns: int) -> bytes | None:
@@ -61,7 +72,7 @@ class Composer:
         `memories`: their addresses, which must be valid.
         """
         self._memories[:] = list(memories)
-        if self._compose(self._handle, self._memories, time_ns, self._message) != 0:
+        if self._compose(self._handle, self._memories, time_ns, self._message, byref(self._size)) != 0:
             self.refused += 1
             return None
-        return self._message.raw
+        return self._message.raw[: self._size.value]

@@ -16,6 +16,8 @@ from fcsl_compiler.api.ros import ComposerConversion, ReaderConversion, Term
 from ..c_run import CError
 from ..library import bind_runtime, runtime_library
 
+#: FCSL_ROS_NONE
+NONE = 0xFFFFFFFF
 #: fcsl_ros_status_t: the result of reading a message, or a value of it.
 REASONS = (
     "taken",
@@ -32,6 +34,7 @@ REASONS = (
     "future",
     "older",
     "repeated",
+    "unknown",
 )
 
 
@@ -85,7 +88,22 @@ class CValue(Structure):
         ("first_guard", c_uint32),
         ("guard_count", c_uint32),
         ("rotation", c_uint8),
+        ("limited", c_uint8),
+        ("first_choice", c_uint32),
+        ("choice_count", c_uint32),
     ]
+
+
+class CChoice(Structure):
+    """fcsl_ros_choice_t"""
+
+    _fields_ = [("index", CTerm), ("at", c_uint32), ("type", c_uint8), ("first", c_uint32), ("count", c_uint32)]
+
+
+class CSegment(Structure):
+    """fcsl_ros_segment_t"""
+
+    _fields_ = [("offset", c_uint32), ("size", c_uint32), ("align", c_uint8), ("element", c_uint8)]
 
 
 class CReaderConversion(Structure):
@@ -99,6 +117,7 @@ class CReaderConversion(Structure):
         ("rows", POINTER(CRow)),
         ("terms", POINTER(CTerm)),
         ("guards", POINTER(CGuard)),
+        ("choices", POINTER(c_int64)),
         ("part_count", c_uint32),
         ("pick_count", c_uint32),
         ("name_count", c_uint32),
@@ -106,6 +125,7 @@ class CReaderConversion(Structure):
         ("row_count", c_uint32),
         ("term_count", c_uint32),
         ("guard_count", c_uint32),
+        ("choice_count", c_uint32),
         ("anchor_count", c_uint32),
         ("size", c_uint32),
         ("stamp_anchor", c_uint32),
@@ -121,9 +141,17 @@ class CComposerConversion(Structure):
         ("text", POINTER(c_uint8)),
         ("rows", POINTER(CRow)),
         ("terms", POINTER(CTerm)),
+        ("choices", POINTER(CChoice)),
+        ("names", POINTER(c_char_p)),
+        ("numbers", POINTER(c_int64)),
+        ("segments", POINTER(CSegment)),
         ("size", c_uint32),
         ("row_count", c_uint32),
         ("term_count", c_uint32),
+        ("choice_count", c_uint32),
+        ("name_count", c_uint32),
+        ("number_count", c_uint32),
+        ("segment_count", c_uint32),
         ("memory_count", c_uint32),
         ("stamp_offset", c_uint32),
     ]
@@ -143,7 +171,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sample_input_behind_ns": (c_int64, [ptr]),
     "fcsl_ros_composer_new": (ptr, [POINTER(CComposerConversion), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
-    "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
+    "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr, POINTER(c_uint32)]),
     "fcsl_publish_queue_new": (ptr, [c_int, _ERROR]),
     "fcsl_publish_queue_free": (None, [ptr]),
     "fcsl_publish_queue_wake": (None, [ptr]),
@@ -177,6 +205,14 @@ def _table(kind: Any, rows: Sequence[Sequence[Any]]) -> Any:
     return (kind * max(1, len(rows)))(*(kind(*row) for row in rows))
 
 
+def _texts(texts: Sequence[bytes]) -> Any:
+    return (c_char_p * max(1, len(texts)))(*texts)
+
+
+def _numbers(numbers: Sequence[int]) -> Any:
+    return (c_int64 * max(1, len(numbers)))(*numbers)
+
+
 def _term(term: Term) -> tuple[float, int, int, int]:
     return term.factor, term.anchor, term.offset, term.type
 
@@ -194,15 +230,20 @@ def _row_tables(conversion: ReaderConversion | ComposerConversion) -> dict[str, 
 def reader_conversion(conversion: ReaderConversion) -> CReaderConversion:
     """The conversion as C has it."""
     values = [
-        (v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count, v.rotation)
+        (
+            *(v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count, v.rotation),
+            *(v.limited, v.first_choice, v.choice_count),
+        )
         for v in conversion.values
     ]
     return CReaderConversion(
         parts=_table(CPart, [(p.code, p.align, p.size, p.first, p.count) for p in conversion.parts]),
         picks=_table(CPick, [(p.anchor, p.count, p.element, p.name) for p in conversion.picks]),
-        names=(c_char_p * max(1, len(conversion.names)))(*conversion.names),
+        names=_texts(conversion.names),
         values=_table(CValue, values),
         guards=_table(CGuard, [(CTerm(*_term(g.at)), g.value) for g in conversion.guards]),
+        choices=_numbers(conversion.choices),
+        choice_count=len(conversion.choices),
         part_count=len(conversion.parts),
         pick_count=len(conversion.picks),
         name_count=len(conversion.names),
@@ -221,6 +262,14 @@ def composer_conversion(conversion: ComposerConversion) -> CComposerConversion:
     """The conversion as C has it."""
     return CComposerConversion(
         text=(c_uint8 * len(conversion.text)).from_buffer_copy(conversion.text),
+        choices=_table(CChoice, [(CTerm(*_term(c.index)), c.at, c.type, c.first, c.count) for c in conversion.choices]),
+        names=_texts(conversion.names),
+        numbers=_numbers(conversion.numbers),
+        segments=_table(CSegment, [(s.offset, s.size, s.align, s.element) for s in conversion.segments]),
+        choice_count=len(conversion.choices),
+        name_count=len(conversion.names),
+        number_count=len(conversion.numbers),
+        segment_count=len(conversion.segments),
         size=len(conversion.text),
         memory_count=conversion.memory_count,
         stamp_offset=conversion.stamp_offset,

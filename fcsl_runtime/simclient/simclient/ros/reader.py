@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.api.ros import ConversionError, Definitions, Pick, ReaderConversion, has_stamp, reader_conversion
+from fcsl_compiler.api.ros import ConversionError, Definitions, Pick, has_stamp, reader_conversion
 
 from ..c_run import CError
 from ..errors import MapError, TwinError
@@ -63,10 +63,23 @@ class Reader:
         except ConversionError as error:
             raise MapError(str(error)) from None
         self.has_stamp = has_stamp(definitions, message)
-        self.dtype = _dtype(picks, conversion)
+        self._open(native.reader_conversion(conversion), [(p.name, p.type, p.count) for p in picks])
+
+    @classmethod
+    def compiled(cls, address: int, columns: Sequence[tuple[str, str, int]]) -> Reader:
+        """By the conversion at an address in a machine's library, which stays loaded. `columns`: name, type and count of
+        each value."""
+        made, conversion = cls.__new__(cls), native.CReaderConversion.from_address(address)
+        made.has_stamp = conversion.stamp_anchor != native.NONE
+        made._open(conversion, columns)
+        return made
+
+    def _open(self, conversion: native.CReaderConversion, columns: Sequence[tuple[str, str, int]]) -> None:
+        values = [conversion.values[i] for i in range(conversion.value_count)]
+        self.dtype = _dtype(columns, [value.offset for value in values], conversion.size)
         #: Of each pick, whether it is a rotation, of which a quaternion of length zero is refused.
-        self.rotations = tuple(value.rotation for value in conversion.values)
-        self._conversion = native.reader_conversion(conversion)  # the reader keeps its address
+        self.rotations = tuple(bool(value.rotation) for value in values)
+        self._conversion = conversion  # the reader keeps its address
         library, failure = native.library(), CError()
         handle = library.fcsl_ros_reader_new(byref(self._conversion), byref(failure))
         if not handle:
@@ -74,9 +87,9 @@ class Reader:
         self._handle: int = handle
         self._read, self._end = library.fcsl_ros_read, library.fcsl_ros_reader_end
         self._read_many = library.fcsl_ros_read_many
-        self._value_count = len(picks)
+        self._value_count = len(columns)
         self._row = ctypes.create_string_buffer(max(1, conversion.size))
-        self._status = ctypes.create_string_buffer(max(1, len(picks)))
+        self._status = ctypes.create_string_buffer(max(1, len(columns)))
         self._stamp = ctypes.c_int64()
         weakref.finalize(self, library.fcsl_ros_reader_free, handle)
 
@@ -114,12 +127,12 @@ class Reader:
         return Samples(values, stamps, status)
 
 
-def _dtype(picks: Sequence[Pick], conversion: ReaderConversion) -> np.dtype[Any]:
+def _dtype(columns: Sequence[tuple[str, str, int]], offsets: Sequence[int], size: int) -> np.dtype[Any]:
     return np.dtype(
         {
-            "names": [p.name for p in picks],
-            "formats": [(_DTYPES[p.type], (p.count,) if p.count > 1 else ()) for p in picks],
-            "offsets": [value.offset for value in conversion.values],
-            "itemsize": conversion.size,
+            "names": [name for name, _, _ in columns],
+            "formats": [(_DTYPES[type_], (count,) if count > 1 else ()) for _, type_, count in columns],
+            "offsets": list(offsets),
+            "itemsize": size,
         }
     )

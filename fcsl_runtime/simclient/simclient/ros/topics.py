@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The channels of a machine that its JSON maps onto standard ROS 2 messages, by topic.
+"""The channels of a machine that its JSON maps onto ROS 2 messages, by topic, and the conversions of their messages, which
+are those of the machine's library.
 
 Channels of one direction that name the same topic are parts of one message.
 """
@@ -10,10 +11,10 @@ import weakref
 from ctypes import byref, c_uint32
 from dataclasses import dataclass
 
-from fcsl_compiler.api.ros import STANDARD, Pick, Source, full_name
+from fcsl_compiler.api.ros import Source
 
 from ..c_run import CError
-from ..descriptor import Channel, Machine
+from ..descriptor import Channel, Machine, RosMessage
 from ..errors import TwinError
 from ..run import Run
 from . import native
@@ -26,40 +27,39 @@ class RosTopic:
     """A topic of a machine's `ros` blocks.
 
     `name` is relative to the node's namespace unless it begins with a slash; `type` is the full name of its message;
-    `direction` is "sensor" (the machine receives it) or "actuator" or "report" (the machine sends it); frames may be empty.
+    `type_hash` that of its definition at build time; `direction` is "sensor" (the machine receives it) or "actuator" or
+    "report" (the machine sends it); frames may be empty.
     """
 
     name: str
     type: str
+    type_hash: str
     frame: str
     child_frame: str
     direction: str
     channels: tuple[Channel, ...]
+    message: RosMessage
 
 
 def topics_of(machine: Machine) -> tuple[RosTopic, ...]:
     """The topics of a machine, in the order of its JSON."""
-    groups: dict[tuple[str, str], list[Channel]] = {}
-    for channel in machine.channels:
-        if channel.ros_type:
-            groups.setdefault((channel.direction, channel.ros_topic), []).append(channel)
-    return tuple(
-        RosTopic(name, full_name(first.ros_type), first.ros_frame, first.ros_child_frame, direction, (first, *others))
-        for (direction, name), (first, *others) in groups.items()
-    )
+    return tuple(_topic(machine, message) for message in machine.ros_messages)
+
+
+def _topic(machine: Machine, message: RosMessage) -> RosTopic:
+    first, *others = (machine.channels[index] for index in message.channels)
+    frames = first.ros_frame, first.ros_child_frame
+    return RosTopic(message.topic, message.type, message.type_hash, *frames, first.direction, (first, *others), message)
 
 
 def reader_of(topic: RosTopic) -> Reader:
-    """A reader of the topic's messages, with a column for each channel by name. Raises MapError."""
-    picks = [
-        Pick(c.name, (c.ros_field,), c.field.type, c.field.count, axes=c.ros_axes, null_refused=True)
-        for c in topic.channels
-    ]
-    return Reader(STANDARD, topic.type, picks, topic.frame, topic.child_frame)
+    """A reader of the topic's messages, with a column for each channel by name."""
+    columns = [(c.name, c.field.type, c.field.count) for c in topic.channels]
+    return Reader.compiled(topic.message.reader, columns)
 
 
 def sources_of(topic: RosTopic) -> list[Source]:
-    """What fills the topic's message, in a machine struct (memory 0)."""
+    """What fills the topic's message, in a machine struct (memory 0), for another message that has some of it."""
     return [
         Source(c.ros_field, c.field.type, c.field.count, c.field.offset, axes=c.ros_axes, name=c.name)
         for c in topic.channels
@@ -67,15 +67,15 @@ def sources_of(topic: RosTopic) -> list[Source]:
 
 
 def composer_of(topic: RosTopic) -> Composer:
-    """A composer of the topic's message from a machine struct (memory 0). Raises MapError."""
-    return Composer(STANDARD, topic.type, sources_of(topic), topic.frame, topic.child_frame)
+    """A composer of the topic's message from a machine struct (memory 0)."""
+    return Composer.compiled(topic.message.composer)
 
 
 class SampleInput:
     """Delivers the messages of a sensor topic to a run."""
 
     def __init__(self, run: Run, topic: RosTopic):
-        """Raises MapError or TwinError."""
+        """Raises TwinError."""
         self._run, self._reader = run, reader_of(topic)
         self._names = [channel.name for channel in topic.channels]
         library, error = native.library(), CError()

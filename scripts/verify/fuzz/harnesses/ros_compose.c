@@ -29,9 +29,11 @@ static void apply(const fcsl_ros_composer_t *composer, uint32_t size, bytes_t *b
     const uint8_t *const memories[] = {memory, memory};
     uint8_t *message = malloc(size);
     FUZZ_CHECK(message != NULL);
-    const fcsl_ros_status_t status = fcsl_ros_compose(composer, memories, time_ns, message);
+    uint32_t written = 0;
+    const fcsl_ros_status_t status = fcsl_ros_compose(composer, memories, time_ns, message, &written);
     FUZZ_CHECK(status == FCSL_ROS_TAKEN || status == FCSL_ROS_RANGE || status == FCSL_ROS_NAN ||
                status == FCSL_ROS_STAMP);
+    FUZZ_CHECK(written <= size);
     free(message);
 }
 
