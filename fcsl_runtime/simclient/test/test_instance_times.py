@@ -68,7 +68,10 @@ def write(folder: Path) -> Path:
             "RUN": {"schedule": {"light": 1000, "heavy": 1000, "slow": 250, "faulty": 1000}},
             "REST": {"schedule": {"idle": 1000}},
         },
-        "transitions": [{"from": "RUN", "to": "REST", "request": "STOP"}, {"from": "REST", "to": "RUN", "request": "GO"}],
+        "transitions": [
+            {"from": "RUN", "to": "REST", "request": "STOP"},
+            {"from": "REST", "to": "RUN", "request": "GO"},
+        ],
     }
     folder.mkdir(exist_ok=True)
     (folder / "law.py").write_text(SOURCE)
@@ -107,9 +110,7 @@ def test_a_twin_finds_the_instance_that_takes_longest(config: Path, measured: No
         assert twin.get_value("faulty.counters.faults") == TICKS
 
 
-def test_values_are_those_of_the_machine_without(
-    config: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_values_are_those_of_the_machine_without(config: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     hashes, digests = [], []
     for times in ("", "1"):
         monkeypatch.setenv("FCSL_TIMES", times)

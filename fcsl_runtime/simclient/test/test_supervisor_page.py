@@ -161,6 +161,23 @@ def test_requirements_are_shown_with_their_verdicts(
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
+def test_times_of_instances_are_shown(
+    page: Page, supervisor: Supervisor, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FCSL_TIMES", "1")
+    copy(build_machine(machine(tmp_path, [])).library, root / "measured.so")
+    run = supervisor.start("measured.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        client.tick(3)
+        page.run(f"location.hash = '{run['id']}'")
+        cells = "[...document.querySelectorAll('#times tbody tr')].map((row) => [...row.cells].map((c) => c.innerText))"
+        page.wait(f"{cells}.length === 4 && {cells}[3][1] === '3'")
+        rows = page.run(cells)
+        assert {row[0]: row[1] for row in rows} == {"src": "3", "slow": "1", "other": "3", "step": "3"}
+        assert rows[3][0] == "step" and rows[3][6] == "100.0 %" and all(row[2].endswith(" µs") for row in rows)
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
+
+
 def test_ticks_of_violations_are_those_that_two_verdicts_show(page: Page) -> None:
     verdicts = [(1, 3, 12), (1, 5, 14), (2, 6, 20), (5, 11, 40), (5, 11, 40), (1, 3, 12)]
     shown = [{"violations": n, "violated_ticks": ticks, "last_tick": last} for n, ticks, last in verdicts]

@@ -264,6 +264,28 @@ def test_verdicts_on_requirements(supervisor: Supervisor, root: Path, tmp_path: 
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
+def test_times_of_instances(
+    supervisor: Supervisor, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = write(tmp_path)
+    shutil.copy(build_machine(config).library, root / "plain.so")
+    monkeypatch.setenv("FCSL_TIMES", "1")
+    shutil.copy(build_machine(config).library, root / "measured.so")
+    run = supervisor.start("measured.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        client.tick(5)
+    times = supervisor.get(f"/runs/{run['id']}/times").json
+    assert times["machine"]["runs"] == 5 and times["machine"]["total_ns"] > 0
+    found = families(supervisor.get("/metrics").body)
+    for name, of in (("runs", lambda row: row["runs"]), ("seconds", lambda row: row["total_ns"] / 1e9)):
+        samples = [s for s in found[f"fcsl_run_instance_{name}"].samples if s.labels["run"] == run["id"]]
+        assert {s.labels["instance"]: s.value for s in samples} == {instance: of(row) for instance, row in times.items()}
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
+    other = supervisor.start("plain.so", paused=True)
+    assert supervisor.get(f"/runs/{other['id']}/times").json == {}
+    supervisor.ask("DELETE", f"/runs/{other['id']}")
+
+
 def check_histogram(family: Any, run: str, times: dict[str, Any]) -> None:
     """Against the finer one of the variable server: cumulative, whole, and each bucket holds what it says."""
     samples = [sample for sample in family.samples if sample.labels["run"] == run]

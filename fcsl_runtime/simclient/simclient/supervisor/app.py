@@ -63,6 +63,7 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
             Route("/runs/{id}", on.stop, methods=["DELETE"]),
             Route("/runs/{id}/health", on.run_health),
             Route("/runs/{id}/requirements", on.requirements),
+            Route("/runs/{id}/times", on.times),
             Route("/runs/{id}/channels", on.channels),
             Route("/runs/{id}/values", on.values),
             Route("/runs/{id}/windows", on.window),
@@ -126,6 +127,10 @@ class _Routes:
     def requirements(self, request: Request) -> Response:
         request_parameters.query(request)
         return Json(run_status.requirements(self._run(request)))
+
+    def times(self, request: Request) -> Response:
+        request_parameters.query(request)
+        return Json(run_status.times(self._run(request)))
 
     def channels(self, request: Request) -> Response:
         request_parameters.query(request)

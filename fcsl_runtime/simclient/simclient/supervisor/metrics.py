@@ -125,6 +125,7 @@ class _Families(Collector):
             yield _counter(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
         yield _lost_requests(serving)
         yield _violations(serving)
+        yield from _times(serving)
         for member, name, what in _HISTOGRAMS:
             yield _histogram(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
         received = [(s, s.run.telemetry.counts) for s in live]
@@ -167,6 +168,20 @@ def _violations(serving: Iterable[Seen]) -> Metric:
         for id_, verdict in seen.stats.get("requirements", {}).items():
             family.add_metric((*_labels(seen), id_), verdict["violations"])
     return family
+
+
+def _times(serving: Iterable[Seen]) -> Iterator[Metric]:
+    labels = (*_RUN_LABELS, "instance")
+    runs = CounterMetricFamily(
+        "fcsl_run_instance_runs", "Executes of an instance, of a measured machine.", labels=labels
+    )
+    seconds = CounterMetricFamily("fcsl_run_instance_seconds", "Time of these executes.", labels=labels)
+    for seen in serving:
+        for instance, row in seen.stats.get("times", {}).items():
+            runs.add_metric((*_labels(seen), instance), row["runs"])
+            seconds.add_metric((*_labels(seen), instance), row["total_ns"] / 1e9)
+    yield runs
+    yield seconds
 
 
 def _histogram(name: str, what: str, rows: Iterable[tuple[Seen, Mapping[str, Any]]]) -> Metric:

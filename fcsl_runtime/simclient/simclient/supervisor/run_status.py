@@ -84,9 +84,19 @@ def health(run: Run) -> dict[str, Any]:
 
 def requirements(run: Run) -> dict[str, Any]:
     """Verdicts so far by id, as `stats` of the variable server has them; {} without requirements. Raises HttpError."""
+    return _stats(run, "requirements")
+
+
+def times(run: Run) -> dict[str, Any]:
+    """How long its instances took so far, as `stats` of the variable server has it; {} if the machine is not measured.
+    Raises HttpError."""
+    return _stats(run, "times")
+
+
+def _stats(run: Run, member: str) -> dict[str, Any]:
     with client_of(run) as client:
         try:
-            found: dict[str, Any] = client.stats().get("requirements", {})
+            found: dict[str, Any] = client.stats().get(member, {})
         except VarError as error:
             raise of_variables(error) from None
     return found

@@ -17,7 +17,7 @@ from .show import table
 from .wire import VarError
 
 Times = Mapping[str, InstanceTime]
-_HEAD = ("", "runs", "mean", "p50", "p99", "max", "of the step")
+_HEAD = ("instance", "runs", "mean", "p50", "p99", "max", "of the step")
 #: What no instance took: due tests, delayed connections, transitions, and the readings of the clock.
 _REST = "(rest)"
 _PERIOD_S = 1.0

@@ -8,6 +8,7 @@ import { drawStates } from "./plot.js";
 import { Requirements } from "./requirements.js";
 import { healthClass } from "./runs.js";
 import { Series } from "./series.js";
+import { Times } from "./times.js";
 
 const LISTED_MAX = 200, CURVES_MAX = 64;
 const RATE_S = 3;
@@ -33,6 +34,7 @@ export class RunView {
       onChange();
     });
     this.requirements = new Requirements($("requirements"));
+    this.times = new Times($("times"));
     $("filter").oninput = () => this.#list();
     $("seconds").onchange = () => this.#draw();
     $("printed").ontoggle = () => this.refresh();
@@ -61,6 +63,7 @@ export class RunView {
     $("instances").replaceChildren();
     this.panels.clear();
     this.requirements.open(id);
+    this.times.open(id);
     this.#list();
     this.onChange();
     if (id === null) return;
@@ -94,7 +97,10 @@ export class RunView {
       element("li", {}, `${name}: `, element("span", { className: healthClass(health), textContent: health })));
     $("instances").replaceChildren(...found);
     if (this.#numbers.length === 0 && run.status === "running") this.#describe(this.id).catch(() => {});
-    if (run.status === "running") this.requirements.refresh().catch(this.onError);
+    if (run.status === "running") {
+      this.requirements.refresh().catch(this.onError);
+      this.times.refresh().catch(this.onError);
+    }
     if (run.status !== "ended" || run.status !== this.status) this.refresh();
     this.status = run.status;
     this.#rate();
