@@ -54,7 +54,7 @@ def _load() -> ctypes.CDLL:
     library = ctypes.CDLL(_built("FCSL_TEST_RUN_LIBRARY", "libfcsl_run.so"))
     pointer = ctypes.c_void_p
     library.fcsl_run_open.restype = pointer
-    library.fcsl_run_open.argtypes = [ctypes.c_char_p, ctypes.c_char_p, pointer]
+    library.fcsl_run_open.argtypes = [ctypes.c_char_p, ctypes.c_char_p, pointer, pointer]
     library.fcsl_run_set.argtypes = [pointer, ctypes.c_uint32, ctypes.c_uint32, pointer, ctypes.c_uint32, pointer]
     library.fcsl_run_step.argtypes = [pointer, ctypes.c_uint64, pointer]
     library.fcsl_run_set_state.argtypes = [pointer, ctypes.c_int32, pointer]
@@ -96,7 +96,7 @@ class Run:
 
     def __init__(self) -> None:
         self._error = _Error()
-        self.handle = _LIBRARY.fcsl_run_open(FIXTURE.encode(), None, ctypes.byref(self._error))
+        self.handle = _LIBRARY.fcsl_run_open(FIXTURE.encode(), None, None, ctypes.byref(self._error))
         assert self.handle, self._error.text.decode()
 
     def call(self, name: str, *arguments: Any) -> int:

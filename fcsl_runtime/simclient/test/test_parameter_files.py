@@ -4,18 +4,25 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tuned_craft as craft
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from native import flying
 
 from simclient import AlgTwin, ProcessTwin, PyTwin, Twin, TwinError
 from simclient.bag import columns
 from simclient.bag.digest import digest
 from simclient.library import runtime_program
 from simclient.replay import replay
+from simclient.vars.client import VarClient
 
 HEAD = "/**:\n  ros__parameters:\n"
 
@@ -178,7 +185,7 @@ def test_flight_program_refuses(library: Path, tmp_path: Path) -> None:
 
 
 def test_wrong_arguments_of_twins(machine: Path, tmp_path: Path) -> None:
-    for given, said in (
+    for wrong, said in (
         (3, "the path of a parameter file, or a mapping from names to values, wanted"),
         ({"law.gain": object()}, "is no value of a parameter"),
         ({"law.gain": float("nan")}, "^`law.gain`: expected a finite number"),
@@ -186,4 +193,71 @@ def test_wrong_arguments_of_twins(machine: Path, tmp_path: Path) -> None:
         (tmp_path, "Is a directory"),
     ):
         with pytest.raises(TwinError, match=said):
-            AlgTwin.from_config(machine, parameters=given)  # type: ignore[arg-type]
+            AlgTwin.from_config(machine, parameters=wrong)  # type: ignore[arg-type]
+
+
+# ---- save and load on a running machine --------------------------------------------------------------------------------
+
+
+def var(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["fcsl", "var", *map(str, words)], capture_output=True, text=True, timeout=60)
+
+
+@contextmanager
+def serving(library: Path, folder: Path, *options: str | Path) -> Iterator[VarClient]:
+    """A paused flight program with its variable server."""
+    socket = folder / "fc.sock"
+    with flying("--socket", socket, "--paused", *options, library=str(library)) as program:
+        program.client(socket).close()
+        with VarClient(socket) as client:
+            yield client
+
+
+def test_gains_tuned_in_flight_are_kept(library: Path, tmp_path: Path) -> None:
+    """Loaded all at once, saved, and flown with again: the beginning is the same."""
+    tuned, other = tmp_path / "tuned.yaml", tmp_path / "again.yaml"
+    with serving(library, tmp_path) as client:
+        address = client.address
+        assert var("--socket", address, "save-parameters", tuned).stdout.startswith("0 parameters differ")
+        assert AlgTwin.from_library(library, parameters=tuned).get_value("law.parameters.gain") == 1.0
+        refused = var(
+            "--socket", address, "load-parameters", craft.file(tmp_path, HEAD + "    law.on: false\n    law.gain: 11\n")
+        )
+        assert refused.returncode == 1 and "params.yaml:4: `law.gain` lies in [0, 10]" in refused.stderr
+        assert client.get_value("law.parameters.on") is True
+        loaded = var("--socket", address, "load-parameters", craft.file(tmp_path))
+        assert loaded.returncode == 0, loaded.stderr
+        exists = var("--socket", address, "save-parameters", tuned)
+        assert exists.returncode == 1 and "say --overwrite" in exists.stderr
+        saved = var("--socket", address, "save-parameters", tuned, "--overwrite")
+        assert saved.stdout == f"13 parameters differ from the compiled values: {tuned}\n", saved.stderr
+        values = client.get("law.parameters")["law.parameters"]
+    assert "    law.gain: 3.0  # [N/rad]\n" in tuned.read_text()
+    assert '    law.on_done: "tr_GO"\n' in tuned.read_text()
+    with serving(library, tmp_path, "--parameters", tuned) as client:
+        assert client.get("law.parameters")["law.parameters"] == values
+        assert var("--socket", client.address, "save-parameters", other).returncode == 0
+    assert other.read_text() == tuned.read_text()
+
+
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=6, max_size=6),
+    st.floats(width=32, allow_nan=False, allow_infinity=False),
+)
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_saved_floats_come_back_bit_for_bit(library: Path, tuner: VarClient, table: list[float], narrow: float) -> None:
+    tuner.set({"law.parameters.table": [table[:3], table[3:]], "law.parameters.narrow": narrow})
+    text = tuner.parameters()
+    held = tuner.save()
+    tuner.set({"law.parameters.table": [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "law.parameters.narrow": 0.5})
+    tuner.set_parameters(text)
+    assert tuner.save() == held
+    read = yaml.safe_load(text)["/**"]["ros__parameters"]
+    assert read.get("law.table", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) == table
+    assert all(type(value) is float for value in read.get("law.table", ()))
+
+
+@pytest.fixture(scope="module")
+def tuner(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[VarClient]:
+    with serving(library, tmp_path_factory.mktemp("served")) as client:
+        yield client

@@ -346,7 +346,7 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
     def completed(*words: str | Path) -> list[str]:
         return candidates(COMMANDS.verbs, ["var", *map(str, words)])
 
-    assert set(completed("s")) == {"set", "state", "set-state", "save", "stats"}
+    assert set(completed("s")) == {"set", "state", "set-state", "save", "save-parameters", "stats"}
     assert completed("get", "sensors.o") == ["sensors.outputs."]
     assert "sensors.outputs.gyro=" in completed("set", "sensors.outputs.")
     assert "IDLE" in completed("set-state", "")

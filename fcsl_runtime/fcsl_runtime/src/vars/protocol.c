@@ -28,6 +28,8 @@ enum { COMMON_BYTES = sizeof COMMON - 1 };
 static const handler_t HANDLERS[] = {
     {"get", COMMON "paths", 0, fcsl_handle_get},
     {"set", COMMON "values allow_non_finite", 1, fcsl_handle_set},
+    {"parameters", COMMON, 0, fcsl_handle_parameters},
+    {"set_parameters", COMMON "file name", 1, fcsl_handle_set_parameters},
     {"eval", COMMON "expression", 0, fcsl_handle_eval},
     {"pause", COMMON, 1, fcsl_handle_pause},
     {"resume", COMMON, 1, fcsl_handle_resume},
@@ -408,7 +410,7 @@ int fcsl_protocol_open(protocol_t *protocol)
     protocol->tokens = calloc(TOKENS_MAX, sizeof *protocol->tokens);
     protocol->text = malloc(REQUEST_BYTES_MAX + 8u);
     if (protocol->snapshot == NULL || protocol->checkpoint.bytes == NULL || protocol->incoming == NULL ||
-        protocol->tokens == NULL || protocol->text == NULL) {
+        protocol->tokens == NULL || protocol->text == NULL || fcsl_protocol_open_parameters(protocol, machine) != 0) {
         fcsl_protocol_free(protocol);
         return -1;
     }
@@ -422,6 +424,10 @@ void fcsl_protocol_free(protocol_t *protocol)
     free(protocol->incoming);
     free(protocol->tokens);
     free(protocol->text);
+    free(protocol->compiled);
+    free(protocol->file);
+    protocol->compiled = NULL;
+    protocol->file = NULL;
     protocol->snapshot = NULL;
     protocol->checkpoint.bytes = NULL;
     protocol->incoming = NULL;

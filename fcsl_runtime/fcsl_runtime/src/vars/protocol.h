@@ -26,6 +26,7 @@
 enum {
     TOKENS_MAX = REQUEST_BYTES_MAX / 2,
     TOKEN_BYTES_MAX = 128,
+    PARAMETER_TEXT_BYTES = REPLY_BYTES_MAX / 2,
     FOLDER_BYTES = 3840, /* with FILE_BYTES and what fcsl_replace_file adds less than PATH_MAX */
     FILE_PATH_BYTES = FOLDER_BYTES + FILE_BYTES
 };
@@ -56,6 +57,8 @@ typedef struct {
     json_token_t *tokens;   /* TOKENS_MAX */
     char *text;             /* REQUEST_BYTES_MAX: strings of a request */
     uint8_t *snapshot;      /* the publication of `moment` */
+    uint8_t *compiled;       /* the machine's struct with its compiled parameters; null without a machine */
+    char *file;              /* PARAMETER_TEXT_BYTES: a parameter file that is made */
     const char *checkpoints; /* the folder of named ones, or null */
     checkpoint_buffer_t checkpoint;
     uint8_t *incoming; /* checkpoint.room bytes: what a request brings, before it is known to be right */
@@ -172,6 +175,10 @@ int fcsl_handle_saved(request_t *request);
 int fcsl_handle_load(request_t *request);
 int fcsl_handle_restore(request_t *request);
 void fcsl_write_saved(request_t *request);
+/* request_parameters.c: parameter files. fcsl_protocol_open_parameters takes memory; 0, or -1 without. */
+int fcsl_protocol_open_parameters(protocol_t *protocol, const fcsl_machine_t *machine);
+int fcsl_handle_parameters(request_t *request);
+int fcsl_handle_set_parameters(request_t *request);
 /* request_inject.c: what tests inject into a machine. */
 int fcsl_handle_inject(request_t *request);
 int fcsl_handle_attach(request_t *request);

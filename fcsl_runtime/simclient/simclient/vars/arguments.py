@@ -45,6 +45,8 @@ _EXAMPLES = {
     "set-state": "IDLE",
     "save": "craft.checkpoint",
     "restore": "craft.checkpoint",
+    "save-parameters": "params.yaml",
+    "load-parameters": "params.yaml",
     "describe": "nav.outputs.x",
 }
 
@@ -105,6 +107,11 @@ def _restore(command: argparse.ArgumentParser) -> None:
     command.add_argument("--ignore-source-hash", action="store_true", help=what)
 
 
+def _save_parameters(command: argparse.ArgumentParser) -> None:
+    command.add_argument("file")
+    command.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
+
+
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) < 2**32:
         raise argparse.ArgumentTypeError(f"a whole number from 1 on wanted, not {text!r}")
@@ -148,6 +155,18 @@ _COMMANDS: tuple[tuple[str, str, str, Fill], ...] = (
     ("set-state", "write.set_state", "enters a state at once", lambda c: c.add_argument("state")),
     ("save", "checkpoints.save", "writes a checkpoint", _save),
     ("restore", "checkpoints.restore", "restores a checkpoint", _restore),
+    (
+        "save-parameters",
+        "parameters.save",
+        "writes the parameters that differ from the compiled ones to a parameter file",
+        _save_parameters,
+    ),
+    (
+        "load-parameters",
+        "parameters.load",
+        "writes the values of a parameter file before the next tick: all, or none if one is refused",
+        lambda c: c.add_argument("file"),
+    ),
     (
         "describe",
         "read.describe",

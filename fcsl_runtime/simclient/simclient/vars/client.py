@@ -109,6 +109,15 @@ class VarClient(VarWire):
         written = {path: _jsonable(value) for path, value in values.items()}
         return self._call("set", values=written, **({"allow_non_finite": True} if allow_non_finite else {}))
 
+    def parameters(self) -> str:
+        """A parameter file with the parameters that differ from the compiled ones, and their units."""
+        return str(self._call("parameters")["file"])
+
+    def set_parameters(self, file: str, name: str = "") -> dict[str, Any]:
+        """Writes the values of a parameter file before the next tick, or none if one is refused; `name` is what errors
+        call it. Its text has at most about 60 KB."""
+        return self._call("set_parameters", file=file, name=name)
+
     def pause(self) -> dict[str, Any]:
         """Stops the machine; from now on only `tick` runs it."""
         return self._call("pause")
