@@ -103,7 +103,7 @@ PACKAGES = {
     "fcsl_compiler": Package(
         {
             "include": (
-                *("fcsl_cover.h", "fcsl_exact_math.h", "fcsl_hw.h", "fcsl_machine.h", "fcsl_math.h"),
+                *("fcsl_cover.h", "fcsl_event.h", "fcsl_exact_math.h", "fcsl_hw.h", "fcsl_machine.h", "fcsl_math.h"),
                 "fcsl_monitor.h",
                 "fcsl_ros_conversion.h",
             )

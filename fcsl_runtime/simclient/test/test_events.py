@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from matplotlib import pyplot
+from native import flying
 from rosbags.highlevel import AnyReader
 from rrd import read_rrd, values
 
@@ -167,8 +168,9 @@ def test_recorded_events_are_checked(tmp_path: Path) -> None:
         run.substitute_events(io, one * 65)
     with pytest.raises(TwinError, match="instance 'io' has no event number 2"):
         run.substitute_events(io, (2).to_bytes(8, "little") + bytes(32))
-    with pytest.raises(TwinError, match="instance number 3 reports no events"):
-        run.substitute_events(3, one)
+    for instance in (0, 3):  # without hardware, and none
+        with pytest.raises(TwinError, match=f"instance number {instance} has no recorded events"):
+            run.substitute_events(instance, one)
     run.close()
 
 
@@ -186,3 +188,23 @@ def test_pictures_and_rerun_show_them(tmp_path: Path) -> None:
     to_rerun(tmp_path / "bag", tmp_path / "run.rrd")
     rows = read_rrd(tmp_path / "run.rrd")
     assert values(rows, "/veh/machine/events", "TextLog:text") == [(e.time_ns / 1e9, str(e)) for e in events]
+
+
+def test_a_flight_program_prints_and_serves_them(tmp_path: Path) -> None:
+    library, summary = build_machine(config(tmp_path)).library, tmp_path / "summary.json"
+    options = ("--socket", tmp_path / "fc.sock", "--paused", "--summary", summary)
+    with flying(*options, library=str(library)) as fc:
+        client = fc.client(tmp_path / "fc.sock")
+        client.ok("set", values={"a.inputs.gate": 3})
+        client.ok("tick", count=30)
+        served = client.ok("stats")["events"]
+        client.close()
+        code, out, err = fc.stop()
+    counts = {"told": 31, "suppressed": 25, "lost": 0}  # ten of 30 and of 15 `ran`, one gate, ten `read`
+    assert code == 0 and {name: served[name] for name in counts} == counts
+    gate = {"tick": 0, "severity": "warning", "instance": "a", "message": "gate passed 3 0 true"}
+    assert served["last"][0] == {**gate, "file": "law.py", "line": 11}
+    assert len(served["last"]) == 31 and json.loads(summary.read_text())["events"] == served
+    assert "fcsl-fc: warning: 'a': gate passed 3 0 true (tick 0, law.py:11)\n" in err
+    assert "fcsl-fc: 'io': read 3 (tick 2)\n" in out and "'a': ran" not in out + err
+    assert "fcsl-fc: events: 31 told, 25 suppressed, 0 without room\n" in out

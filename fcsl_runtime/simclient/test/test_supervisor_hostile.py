@@ -184,6 +184,8 @@ def test_a_body_without_a_length_is_bounded_too(supervisor: Supervisor) -> None:
         *(("GET", f"/runs/1/{part}?x=1", 400, "bad_request") for part in ("health", "channels", "values", "windows")),
         ("GET", "/runs/1/requirements?x=1", 400, "bad_request"),
         ("GET", "/runs/77/requirements", 404, "unknown_run"),
+        ("GET", "/runs/1/events?x=1", 400, "bad_request"),
+        ("GET", "/runs/77/events", 404, "unknown_run"),
         ("GET", "/stream?x=1", 400, "bad_request"),
         ("DELETE", "/runs/1?x=1", 400, "bad_request"),
         ("GET", "/health?" + "x" * 2000, 400, "bad_request"),

@@ -17,6 +17,7 @@ import pytest
 from native import flying
 from prometheus_client.parser import text_string_to_metric_families
 from supervising import Supervisor, supervising, wait_until
+from test_events import config as reporting
 from test_requirements import machine
 from test_twin_lost_requests import BOTH, write
 from vars_machine import build
@@ -262,6 +263,22 @@ def test_verdicts_on_requirements(supervisor: Supervisor, root: Path, tmp_path: 
     verdict = supervisor.get(f"/runs/{run['id']}/requirements").json["LOW-1"]
     assert (verdict["status"], verdict["exercised"], verdict["first_tick"]) == ("violated", 6, 0)
     supervisor.ask("DELETE", f"/runs/{run['id']}")
+
+
+def test_events_of_algorithms(supervisor: Supervisor, root: Path, tmp_path: Path) -> None:
+    shutil.copy(build_machine(reporting(tmp_path)).library, root / "reporting.so")
+    run = supervisor.start("reporting.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        assert supervisor.get(f"/runs/{run['id']}/events").json == {"told": 0, "suppressed": 0, "lost": 0, "last": []}
+        client.set({"a.inputs.gate": 3})
+        client.tick()
+        events = supervisor.get(f"/runs/{run['id']}/events").json
+    assert events["last"][0]["message"] == "gate passed 3 0 true" and events["told"] == len(events["last"]) == 3
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
+    shutil.copy(build_machine(machine(tmp_path, [])).library, root / "silent.so")
+    other = supervisor.start("silent.so", paused=True)
+    assert supervisor.get(f"/runs/{other['id']}/events").json == {}
+    supervisor.ask("DELETE", f"/runs/{other['id']}")
 
 
 def test_times_of_instances(

@@ -14,7 +14,7 @@ from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import ReferenceMachine
 from simclient.descriptor import read_machine
-from simclient.twin.python_run import PythonMachine, fault_rows_of, find_descriptor, layout_of
+from simclient.twin.python_run import PythonMachine, event_rows_of, fault_rows_of, find_descriptor, layout_of
 
 from ..shared import stimulus
 
@@ -32,8 +32,9 @@ class StimulatedTwin:
         tables = read_machine(ctypes.pointer(compiled))
         checked = compile_machine(config, toolchain(), until="schedule").checked
         externs = externs_of(build_externs(config)) if checked.externs else None
-        reference = ReferenceMachine(checked, layout_of(compiled, tables), fault_rows_of(tables), externs)
-        self._machine = PythonMachine(compiled, reference)
+        rows = fault_rows_of(tables), externs, event_rows_of(tables)
+        reference = ReferenceMachine(checked, layout_of(compiled, tables), *rows)
+        self._machine = PythonMachine(compiled, reference, tables.event_sites)
         self._descriptor, self._memory = self._machine.descriptor, ctypes.create_string_buffer(compiled.size)
         self._seed, self._host, self._stimulus = seed, stimulus.host(seed), stimulus.library()
 

@@ -214,8 +214,9 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_start_t *start, 
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        add_event_topic(recorder, name_space, error) != 0 || add_verdict_topic(recorder, name_space, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
-        put_views(recorder, start->views, start_ns, error) != 0 || start_writer(recorder, error) != 0) {
+        add_event_topic(recorder, name_space, error) != 0 || add_verdict_topic(recorder, name_space, error) != 0 ||
+        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start->views, start_ns, error) != 0 ||
+        start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
     }

@@ -178,11 +178,12 @@ int fcsl_run_substitute_events(fcsl_run_t *run, uint32_t instance, const void *b
                                fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
-    if (instance >= machine->instance_count || run->events == NULL) {
-        return fcsl_fail(error, "instance number %" PRIu32 " reports no events", instance);
+    if (instance >= machine->instance_count || run->impure[instance].size == 0 || run->events == NULL) {
+        return fcsl_fail(error, "instance number %" PRIu32 " has no recorded events: it is run in a replay", instance);
     }
     fcsl_events_t *recorded = &run->events->recorded;
-    if (size % FCSL_EVENT_RECORD_BYTES != 0 || size / FCSL_EVENT_RECORD_BYTES > FCSL_EVENTS_PER_TICK - recorded->count) {
+    if (size % FCSL_EVENT_RECORD_BYTES != 0 ||
+        size / FCSL_EVENT_RECORD_BYTES > FCSL_EVENTS_PER_TICK - recorded->count) {
         return fcsl_fail(error, "%" PRIu32 " bytes are no events of one tick", size);
     }
     const uint32_t first = first_site(machine, instance);

@@ -64,6 +64,7 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
             Route("/runs/{id}/health", on.run_health),
             Route("/runs/{id}/requirements", on.requirements),
             Route("/runs/{id}/times", on.times),
+            Route("/runs/{id}/events", on.events),
             Route("/runs/{id}/channels", on.channels),
             Route("/runs/{id}/values", on.values),
             Route("/runs/{id}/windows", on.window),
@@ -131,6 +132,10 @@ class _Routes:
     def times(self, request: Request) -> Response:
         request_parameters.query(request)
         return Json(run_status.times(self._run(request)))
+
+    def events(self, request: Request) -> Response:
+        request_parameters.query(request)
+        return Json(run_status.events(self._run(request)))
 
     def channels(self, request: Request) -> Response:
         request_parameters.query(request)

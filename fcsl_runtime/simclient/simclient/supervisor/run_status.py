@@ -87,6 +87,12 @@ def requirements(run: Run) -> dict[str, Any]:
     return _stats(run, "requirements")
 
 
+def events(run: Run) -> dict[str, Any]:
+    """How many events the algorithms reported, and the `last` of them, as `stats` of the variable server has them; {} for a
+    machine that reports none. Raises HttpError."""
+    return _stats(run, "events")
+
+
 def times(run: Run) -> dict[str, Any]:
     """How long its instances took so far, as `stats` of the variable server has it; {} if the machine is not measured.
     Raises HttpError."""

@@ -137,6 +137,11 @@ def fault_rows_of(machine: Machine) -> list[FaultRow]:
     return [(p.file, p.line, p.column, p.cause) for p in machine.fault_places]
 
 
+def event_rows_of(machine: Machine) -> list[EventRow]:
+    """The table of the places that report events in the form of the reference."""
+    return [(s.instance, s.file, s.line, s.column) for s in machine.event_sites]
+
+
 class _Host:
     """What `step` may use of the host at `address`, read from there only where it is used
     (fcsl_compiler.reference.machine.Host)."""
@@ -251,10 +256,8 @@ MakeReference = Callable[[dict[str, int], Sequence["FaultRow"], Sequence["EventR
 
 def _python_machine(compiled: CMachine, make_reference: MakeReference) -> PythonMachine:
     machine = read_machine(ctypes.pointer(compiled))
-    sites = machine.event_sites
-    rows = [(s.instance, s.file, s.line, s.column) for s in sites]
-    reference = make_reference(layout_of(compiled, machine), fault_rows_of(machine), rows)
-    return PythonMachine(compiled, reference, sites)
+    reference = make_reference(layout_of(compiled, machine), fault_rows_of(machine), event_rows_of(machine))
+    return PythonMachine(compiled, reference, machine.event_sites)
 
 
 class PythonRun(Run):

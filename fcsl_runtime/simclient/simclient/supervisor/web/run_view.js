@@ -3,6 +3,7 @@
 
 import { ask } from "./api.js";
 import { numbersOf, panelsOf } from "./channels.js";
+import { Events } from "./events.js";
 import { Panels, element } from "./panels.js";
 import { drawStates } from "./plot.js";
 import { Requirements } from "./requirements.js";
@@ -34,6 +35,7 @@ export class RunView {
       onChange();
     });
     this.requirements = new Requirements($("requirements"));
+    this.events = new Events($("events"));
     this.times = new Times($("times"));
     $("filter").oninput = () => this.#list();
     $("seconds").onchange = () => this.#draw();
@@ -63,6 +65,7 @@ export class RunView {
     $("instances").replaceChildren();
     this.panels.clear();
     this.requirements.open(id);
+    this.events.open(id);
     this.times.open(id);
     this.#list();
     this.onChange();
@@ -99,6 +102,7 @@ export class RunView {
     if (this.#numbers.length === 0 && run.status === "running") this.#describe(this.id).catch(() => {});
     if (run.status === "running") {
       this.requirements.refresh().catch(this.onError);
+      this.events.refresh().catch(this.onError);
       this.times.refresh().catch(this.onError);
     }
     if (run.status !== "ended" || run.status !== this.status) this.refresh();
