@@ -111,6 +111,7 @@ class Host(c.Structure):
         ("hw", c.c_void_p),
         ("substitute", c.c_void_p),
         ("executed", c.c_void_p),
+        ("measure", c.c_void_p),
         ("events", c.POINTER(Events)),
     ]
 
@@ -145,6 +146,26 @@ class Hardware(c.Structure):
             return c.CFUNCTYPE(c.c_int32, c.c_void_p, *_CALLS[name])(call)
 
         return cls(None, *map(entry, _CALLS))
+
+
+class Fold(c.Structure):
+    _fields_ = [("fields", c.POINTER(Field)), ("field_count", c.c_uint32)]
+
+
+class FoldedInstance(c.Structure):
+    _fields_ = [("fold", c.c_uint32), ("offset", c.c_uint32)]
+
+
+class FoldedFields(c.Structure):
+    _fields_ = [
+        ("folds", c.POINTER(Fold)),
+        ("fold_count", c.c_uint32),
+        ("instances", c.POINTER(FoldedInstance)),
+        ("others", c.POINTER(Field)),
+        ("other_count", c.c_uint32),
+        ("connections", c.c_void_p),
+        ("connection_count", c.c_uint32),
+    ]
 
 
 class Descriptor(c.Structure):
@@ -183,9 +204,26 @@ class Descriptor(c.Structure):
         ("start", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
         ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
         ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),
+        ("measured", c.c_uint8),
         ("event_sites", c.POINTER(EventSite)),
         ("event_site_count", c.c_uint32),
+        ("folded", c.POINTER(FoldedFields)),
     ]
+
+
+def _fields(d: Descriptor) -> dict[str, Field]:
+    """The fields by path; those that are folded without connections."""
+    if d.fields:
+        return {d.fields[i].path.decode(): d.fields[i] for i in range(d.field_count)}
+    folded, found = d.folded.contents, {}
+    for index in range(d.instance_count):
+        one = folded.instances[index]
+        fold = folded.folds[one.fold]
+        for i in range(fold.field_count):
+            field = Field.from_buffer_copy(fold.fields[i])
+            field.offset, field.instance = field.offset + one.offset, index
+            found[(d.instances[index].name + field.path).decode()] = field
+    return found | {folded.others[i].path.decode(): folded.others[i] for i in range(folded.other_count)}
 
 
 def _values(site: EventSite, bits: list[int]) -> tuple[Any, ...]:
@@ -247,7 +285,7 @@ class Machine:
         self._memory = c.create_string_buffer(self.d.size + self.d.align)
         start = c.addressof(self._memory)
         self.base = start + (-start) % self.d.align
-        self.fields = {self.d.fields[i].path.decode(): self.d.fields[i] for i in range(self.d.field_count)}
+        self.fields = _fields(self.d)
         self.instances = {self.d.instances[i].name.decode(): self.d.instances[i] for i in range(self.d.instance_count)}
         self.states = [self.d.states[i].name.decode() for i in range(self.d.state_count)]
         self.channels = {self.d.channels[i].name.decode(): self.d.channels[i] for i in range(self.d.channel_count)}

@@ -67,6 +67,7 @@ class Compilation:
     stack_bound: int | None = None  # stack of step in bytes, after compiling; None if unknown
     cover: bool = False  # True for a coverage build, which must not fly
     times: bool = False  # True for a build of which the host measures each instance
+    folds: bool = True  # hosts make the fields of instances that are alike; firmware has no memory for them
     backend: str = DEFAULT_BACKEND  # language of the source (BACKENDS)
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
     requirements_file: Path | None = None  # instead of the machine's own requirements
@@ -163,7 +164,7 @@ def _emit(c: Compilation) -> None:
     program = emit_machine(lowered, places, c.times)
 
     def describe(to: CWriter) -> None:
-        DescriptorEmitter(m, to, c.build_hash, places, program.stack_bytes, c.times).emit()
+        DescriptorEmitter(m, to, c.build_hash, places, program.stack_bytes, c.times, c.folds).emit()
 
     w: Writer
     if c.backend == "nim":
@@ -223,14 +224,15 @@ def compile_machine(
     backend: str = DEFAULT_BACKEND,
     requirements: Path | None = None,
     times: bool = False,
+    folds: bool = True,
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
     `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a
     subset machine. `requirements`: a file of those that take the place of the machine's own. `times`: the host measures
-    each instance.
+    each instance. `folds`: hosts make the fields of instances that are alike (fcsl_folded_fields_t).
     """
-    c = Compilation(path, toolchain, strict, target, instances, cover=cover, times=times, backend=backend)
+    c = Compilation(path, toolchain, strict, target, instances, cover=cover, times=times, folds=folds, backend=backend)
     c.requirements_file = requirements
     for step in PASSES:
         step.run(c)

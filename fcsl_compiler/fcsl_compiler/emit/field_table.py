@@ -15,7 +15,7 @@ from ..model.machine import Channel, Instance, Machine
 from ..model.ranges import UNBOUNDED, Range
 from ..model.types import Scalar, count_of, leaves, scalar_of, shape_of
 from ..ros.channels import definition_texts
-from .names import channel_member, leaf_member, sensors
+from .names import channel_member, instance_member, leaf_member, sensors
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -37,6 +37,22 @@ class FieldRow:
     doc: str
     range: Range = UNBOUNDED
 
+    @property
+    def in_instance(self) -> bool:
+        return self.role not in ("MACHINE", "CHANNEL")
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Instances with the same fields: rows whose path is what follows the name, and whose member is one of the record."""
+
+    rows: tuple[FieldRow, ...]
+    instances: tuple[int, ...]
+
+
+#: Instances with the fields of another one from which a library has them once (fcsl_folded_fields_t). Fewer are not worth a
+#: table of their own.
+_FOLDED = 64
 
 #: Part of layout_hash. Increase it when the struct changes in a way that the hashed rows do not show, because a
 #: checkpoint contains the bytes of the struct.
@@ -74,6 +90,29 @@ def field_table(machine: Machine) -> list[FieldRow]:
         path, doc, n = "machine.lost_requests", "of each transition: requests lost to another one", len(machine.edges)
         rows.append(FieldRow(path, "MACHINE", "FCSL_U64", (), (n,), n, "lost_requests", "uint64_t", -1, "", doc))
     return rows
+
+
+def fold(machine: Machine, rows: Sequence[FieldRow]) -> list[Fold]:
+    """The folds of a machine, `rows` its field table; none if too few instances are alike."""
+    own: list[list[FieldRow]] = [[] for _ in machine.instances]
+    for row in rows:
+        if row.in_instance:
+            own[row.instance].append(row)
+    found: dict[tuple[str, tuple[tuple[object, ...], ...]], list[int]] = {}
+    for index, instance in enumerate(machine.instances):
+        name, member = len(instance.name), len(instance_member(instance)) + 1
+        alike = tuple((r.path[name:], r.member[member:], r.flags, r.doc) for r in own[index])
+        found.setdefault((instance.algorithm.name, alike), []).append(index)
+    if len(machine.instances) - len(found) < _FOLDED:
+        return []
+    return [_fold(machine, own[alike[0]], alike) for alike in found.values()]
+
+
+def _fold(machine: Machine, rows: Sequence[FieldRow], alike: Sequence[int]) -> Fold:
+    first = machine.instances[alike[0]]
+    name, member = len(first.name), len(instance_member(first)) + 1
+    relative = (replace(r, path=r.path[name:], member=r.member[member:], instance=-1) for r in rows)
+    return Fold(tuple(relative), tuple(alike))
 
 
 def _opened(row: FieldRow, source: str) -> str:

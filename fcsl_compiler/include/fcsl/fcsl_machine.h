@@ -93,6 +93,34 @@ typedef struct {
     double maximum; /* Only parameters have bounds. Both are values of the field's type. */
 } fcsl_field_t;
 
+/* The fields of instances that are alike, once. */
+typedef struct {
+    const fcsl_field_t *fields; /* path: what follows the name of the instance; offset: from its record; without a connection */
+    uint32_t field_count;
+} fcsl_fold_t;
+
+typedef struct {
+    uint32_t fold; /* index into folds */
+    uint32_t offset; /* of its record in the struct */
+} fcsl_folded_instance_t;
+
+typedef struct {
+    uint32_t field;
+    int32_t connected_from;
+} fcsl_folded_connection_t;
+
+/* What a library has instead of `fields` if many of its instances are alike. fcsl_library_unfold (fcsl_library.h) makes the fields of
+ * it; whoever opens a machine by fcsl_run.h finds them made. */
+typedef struct {
+    const fcsl_fold_t *folds;
+    uint32_t fold_count;
+    const fcsl_folded_instance_t *instances; /* one for each of the machine's, which say where their fields begin */
+    const fcsl_field_t *others; /* the fields outside of instances, in order: those before, then those behind */
+    uint32_t other_count;
+    const fcsl_folded_connection_t *connections;
+    uint32_t connection_count;
+} fcsl_folded_fields_t;
+
 typedef struct {
     const char *name;
     const char *algorithm;
@@ -278,7 +306,7 @@ typedef struct {
     uint32_t state_offset; /* int32_t: state of the last tick */
     uint32_t next_state_offset; /* int32_t: state of the coming tick */
     uint32_t ticks_in_state_offset; /* uint64_t: ticks completed since the state was entered; only with after_ticks */
-    const fcsl_field_t *fields;
+    const fcsl_field_t *fields; /* null: `folded` has them */
     uint32_t field_count;
     const fcsl_instance_t *instances;
     uint32_t instance_count;
@@ -321,6 +349,7 @@ typedef struct {
     uint8_t measured; /* built with --times: a step calls `measure` of its host */
     const fcsl_event_site_t *event_sites; /* in the order of their instances */
     uint32_t event_site_count;
+    const fcsl_folded_fields_t *folded; /* null: `fields` has them */
 } fcsl_machine_t;
 
 /* Exported by every machine library; ends with a null pointer. */

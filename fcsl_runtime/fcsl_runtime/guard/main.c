@@ -26,6 +26,7 @@ typedef struct {
     options_t options;
     realtime_t realtime;
     void *library;
+    void *unfolded; /* the descriptor of the machine, if it was folded */
     output_assignment_t *assignments; /* of --actuator */
     board_plan_t *board; /* of --board */
     guard_t guard;
@@ -79,7 +80,8 @@ static uint64_t period_of(const options_t *options)
 static int open_machine(program_t *program, fcsl_error_t *error)
 {
     const options_t *options = &program->options;
-    const fcsl_machine_t *machine = fcsl_library_machine(options->library, options->machine, &program->library, error);
+    const fcsl_machine_t *machine =
+        fcsl_library_machine(options->library, options->machine, &program->library, &program->unfolded, error);
     if (machine == NULL || guard_check_machine(machine, error) != 0) {
         return -1;
     }
@@ -221,6 +223,7 @@ static void close_all(program_t *program)
     free(program->assignments);
     board_plan_free(program->board);
     options_free(&program->options);
+    free(program->unfolded);
     if (program->library != NULL) {
         (void)dlclose(program->library);
     }

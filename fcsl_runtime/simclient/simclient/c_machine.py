@@ -216,6 +216,7 @@ class CMachine(Structure):
         ("measured", c_uint8),
         ("event_sites", POINTER(CEventSite)),
         ("event_site_count", c_uint32),
+        ("folded", c_void_p),
     ]
 
 

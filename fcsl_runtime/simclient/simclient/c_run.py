@@ -101,6 +101,7 @@ _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_open": (ptr, [c_char_p, c_char_p, POINTER(CParameters), _ERROR]),
+    "fcsl_library_unfold": (POINTER(CMachine), [POINTER(CMachine), POINTER(ptr), _ERROR]),
     "fcsl_run_open_machine": (ptr, [POINTER(CMachine), POINTER(CParameters), _ERROR]),
     "fcsl_run_close": (c_int, [ptr, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),

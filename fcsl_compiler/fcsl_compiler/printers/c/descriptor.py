@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 from ...emit.fault_places import FaultPlaces
-from ...emit.field_table import field_table, layout_hash, source_hash
+from ...emit.field_table import FieldRow, Fold, field_table, fold, layout_hash, source_hash
 from ...emit.messages import message_definition, message_name
-from ...emit.names import channel_member
+from ...emit.names import channel_member, instance_member, instance_type
 from ...model.c_names import c_literal, c_string
 from ...model.events import SEVERITIES, sites_of
 from ...model.machine import Channel, Machine, PortRef
@@ -47,10 +47,17 @@ class DescriptorEmitter:
     """Writes the constant tables and the fcsl_machine_t of a machine."""
 
     def __init__(
-        self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces, stack_bytes: int, times: bool
+        self,
+        machine: Machine,
+        writer: CWriter,
+        build_hash: str,
+        places: FaultPlaces,
+        stack_bytes: int,
+        times: bool,
+        folds: bool,
     ):
         self.m, self.w, self.build_hash, self.places = machine, writer, build_hash, places
-        self.stack_bytes, self.times = stack_bytes, times
+        self.stack_bytes, self.times, self.folds = stack_bytes, times, folds
         self.rows = field_table(machine)
         self.by_path = {r.path: n for n, r in enumerate(self.rows)}
         self.struct = f"{machine.name}_t"
@@ -68,11 +75,12 @@ class DescriptorEmitter:
         self._event_sites()
         self._machine()
 
-    def _offset(self, member: str) -> str:
-        return f"(uint32_t)offsetof({self.struct}, {member})"
+    def _offset(self, member: str, struct: str = "") -> str:
+        return f"(uint32_t)offsetof({struct or self.struct}, {member})"
 
-    def _table(self, c_type: str, name: str, rows: list[str]) -> str:
+    def _table(self, c_type: str, name: str, rows: Iterable[str]) -> str:
         """Writes a table. Returns a C pointer expression to it, NULL for an empty table."""
+        rows = list(rows)
         if not rows:
             return "NULL"
         with self.w.braces(f"static const {c_type} {name}[] =", "};"):
@@ -88,25 +96,56 @@ class DescriptorEmitter:
         self.w.line()
 
     def _fields(self) -> None:
-        connected = _connected(self.m, self.by_path)
-        rows = []
-        for r in self.rows:
-            shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
-            flags = " | ".join(r.flags) or "0u"
-            source = connected.get(r.path)
-            source_field = _NONE if source is None else self.by_path[source] if source else _FROM_MACHINE
-            rows.append(
-                f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
-                f"{self._offset(r.member)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source_field}, "
-                f"{c_string(r.unit)}, {c_string(r.doc)}, {_bound(r.range.low)}, {_bound(r.range.high)}}}"
-            )
-        self.fields = self._table("fcsl_field_t", f"fcsl_fields_{self.m.name}", rows)
+        connected = {
+            self.by_path[path]: self.by_path[source] if source else _FROM_MACHINE
+            for path, source in _connected(self.m, self.by_path).items()
+            if path in self.by_path
+        }
+        self.fields, self.folded, folds = "NULL", "NULL", fold(self.m, self.rows) if self.folds else []
+        if folds:
+            self._folded(folds, connected)
+        else:
+            rows = (self._field(row, connected.get(n, _NONE)) for n, row in enumerate(self.rows))
+            self.fields = self._table("fcsl_field_t", f"fcsl_fields_{self.m.name}", rows)
+
+    def _field(self, r: FieldRow, source: int, struct: str = "") -> str:
+        """`struct`: the type that contains its member, that of the machine without one."""
+        shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
+        flags = " | ".join(r.flags) or "0u"
+        return (
+            f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
+            f"{self._offset(r.member, struct)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source}, "
+            f"{c_string(r.unit)}, {c_string(r.doc)}, {_bound(r.range.low)}, {_bound(r.range.high)}}}"
+        )
+
+    def _folded(self, folds: list[Fold], connected: dict[int, int]) -> None:
+        """The tables of fcsl_folded_fields_t."""
+        name = self.m.name
+        tables, uses = [], {}
+        for number, made in enumerate(folds):
+            struct = instance_type(self.m, self.m.instances[made.instances[0]])
+            rows = [self._field(row, _NONE, struct) for row in made.rows]
+            tables.append(f"{{{self._table('fcsl_field_t', f'fcsl_fields_{name}_{number}', rows)}, {len(rows)}u}}")
+            uses |= dict.fromkeys(made.instances, number)
+        of = [f"{{{uses[n]}u, {self._offset(instance_member(i))}}}" for n, i in enumerate(self.m.instances)]
+        others = [self._field(row, _NONE) for row in self.rows if not row.in_instance]
+        pairs = [f"{{{field}u, {source}}}" for field, source in connected.items()]
+        members = (
+            (self._table("fcsl_fold_t", f"fcsl_folds_{name}", tables), len(tables)),
+            (self._table("fcsl_folded_instance_t", f"fcsl_folded_instances_{name}", of), None),
+            (self._table("fcsl_field_t", f"fcsl_fields_{name}", others), len(others)),
+            (self._table("fcsl_folded_connection_t", f"fcsl_folded_connections_{name}", pairs), len(pairs)),
+        )
+        text = ", ".join(part for table, n in members for part in (table, *([] if n is None else [f"{n}u"])))
+        self.folded = f"&fcsl_folded_{name}"
+        self.w.line(f"static const fcsl_folded_fields_t fcsl_folded_{name} = {{{text}}};")
+        self.w.line()
 
     def _instances(self) -> None:
         rows = []
         of: dict[int, list[int]] = {}
         for number, row in enumerate(self.rows):
-            if row.role != "CHANNEL":
+            if row.in_instance:
                 of.setdefault(row.instance, []).append(number)
         for index, i in enumerate(self.m.instances):
             own = of[index]
@@ -236,6 +275,8 @@ class DescriptorEmitter:
             rows |= {"ros_messages": table, "ros_message_count": f"{count}u"}
         if self.payloads != "NULL":
             rows["payloads"] = self.payloads
+        if self.folded != "NULL":
+            rows["folded"] = self.folded
         if self.times:
             rows["measured"] = "1"
         table, count = self.event_sites

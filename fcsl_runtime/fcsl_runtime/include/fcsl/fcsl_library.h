@@ -13,9 +13,14 @@
  * get a SIGBUS) is refused. */
 void *fcsl_library_open(const char *library, const char *what, fcsl_error_t *error);
 
-/* The descriptor of a machine, chosen and checked as fcsl_run_open does; none of its code runs. Null with `error`. *handle is
- * for dlclose, when the descriptor is not used any more. */
-const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name, void **handle, fcsl_error_t *error);
+/* The machine with its fields: itself, or if they are folded a copy that has them. Null with `error`, also for folds that do not
+ * make field_count fields. *made is for free(), when the copy is not used any more; null without one. */
+const fcsl_machine_t *fcsl_library_unfold(const fcsl_machine_t *machine, void **made, fcsl_error_t *error);
+
+/* The descriptor of a machine, chosen, unfolded and checked as fcsl_run_open does; none of its code runs. Null with `error`.
+ * *handle is for dlclose, *made for free(), when the descriptor is not used any more. */
+const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name, void **handle, void **made,
+                                           fcsl_error_t *error);
 
 /* The driver of this direction that a user names: NAME, one that comes with FCSL, or LIBRARY.so:NAME. Null with `error`, which
  * says what there is. *handle is for dlclose, when nothing of the driver is used any more; null for a driver without a library. */

@@ -70,12 +70,27 @@ static const fcsl_machine_t *choose(void *handle, const char *library, const cha
     return NULL;
 }
 
-const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name, void **handle, fcsl_error_t *error)
+/* With its fields, and checked; null with `error`. */
+static const fcsl_machine_t *usable(const fcsl_machine_t *machine, void **made, fcsl_error_t *error)
 {
+    const fcsl_machine_t *whole = fcsl_library_unfold(machine, made, error);
+    if (whole != NULL && fcsl_validate(whole, error) == 0) {
+        return whole;
+    }
+    free(*made);
+    *made = NULL;
+    return NULL;
+}
+
+const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name, void **handle, void **made,
+                                           fcsl_error_t *error)
+{
+    *made = NULL;
     *handle = fcsl_library_open(library, "machine", error);
     const fcsl_machine_t *machine = *handle != NULL ? choose(*handle, library, name, error) : NULL;
-    if (machine != NULL && fcsl_validate(machine, error) == 0) {
-        return machine;
+    const fcsl_machine_t *whole = machine != NULL ? usable(machine, made, error) : NULL;
+    if (whole != NULL) {
+        return whole;
     }
     if (*handle != NULL) {
         (void)dlclose(*handle);
@@ -178,6 +193,7 @@ static void release(fcsl_run_t *run)
     free(run->staging);
     free(run->safe);
     free(run->views);
+    free(run->unfolded);
     if (run->library != NULL) {
         (void)dlclose(run->library);
     }
@@ -220,7 +236,7 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, const fcsl_p
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->machine = fcsl_library_machine(library, machine, &run->library, error);
+    run->machine = fcsl_library_machine(library, machine, &run->library, &run->unfolded, error);
     if (run->machine != NULL && fcsl_cover_attach(run->library, library, run->machine, error) != 0) {
         run->machine = NULL;
     }
@@ -241,7 +257,7 @@ fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, const fcsl_para
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->machine = fcsl_validate(machine, error) == 0 ? machine : NULL;
+    run->machine = usable(machine, &run->unfolded, error);
     return begin(run, parameters, error);
 }
 

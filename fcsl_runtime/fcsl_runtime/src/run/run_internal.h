@@ -28,6 +28,7 @@ typedef struct {
 
 struct fcsl_run {
     void *library;
+    void *unfolded; /* memory of `machine`, if its library has it folded */
     const fcsl_machine_t *machine;
     fcsl_channel_table_t channels;
     uint8_t *data;

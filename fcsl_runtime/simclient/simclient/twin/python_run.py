@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..c_machine import EVENT_VALUES, EVENTS_PER_TICK, NO_OFFSET, CEvents, CMachine, CMonitor
+from ..c_run import CError, load_runtime
 from ..descriptor import EventSite, Machine, read_machine
 from ..errors import TwinError
 from ..events import pack_values
+from ..library import runtime_library
 from ..parameters import CParameters, Parameters
 from ..run import Run
 
@@ -90,7 +92,7 @@ def _hardware(hardware: CHardware) -> dict[str, Callable[..., Any]]:
 
 
 def find_descriptor(library: Path, name: str) -> CMachine:
-    """The descriptor of machine `name` in a compiled library, which stays loaded. Raises TwinError."""
+    """The descriptor of machine `name` in a compiled library, which stays loaded. Its fields may be folded. Raises TwinError."""
     table = (POINTER(CMachine) * _MACHINES_MAX).in_dll(ctypes.CDLL(str(library)), "fcsl_machines")
     for pointer in table:
         if not pointer:
@@ -98,6 +100,16 @@ def find_descriptor(library: Path, name: str) -> CMachine:
         if pointer.contents.name == name.encode():
             return pointer.contents
     raise TwinError(f"{library}: no machine `{name}`")
+
+
+def unfolded(lib: ctypes.CDLL, descriptor: CMachine) -> CMachine:
+    """It with its fields, in memory that stays. Raises TwinError."""
+    error = CError()
+    whole = lib.fcsl_library_unfold(byref(descriptor), byref(ptr()), byref(error))
+    if not whole:
+        raise TwinError(error.text.decode("utf-8", "replace"))
+    found: CMachine = whole.contents
+    return found
 
 
 def find_monitor(library: Path, name: str) -> CMonitor | None:
@@ -272,13 +284,14 @@ class PythonRun(Run):
         make_monitor: MakeReference | None,
         parameters: Parameters | None = None,
     ):
-        self._python = _python_machine(find_descriptor(library, name), make_reference)
+        compiled = unfolded(load_runtime(runtime_library()), find_descriptor(library, name))
+        self._python = _python_machine(compiled, make_reference)
         self._machines = [self._python]
         super().__init__(library, name, parameters)
-        compiled = find_monitor(library, name)
-        if make_monitor is not None and compiled is not None:
-            self._machines.append(_python_machine(compiled.machine.contents, make_monitor))
-            self._monitor = CMonitor.from_buffer_copy(compiled)
+        monitor = find_monitor(library, name)
+        if make_monitor is not None and monitor is not None:
+            self._machines.append(_python_machine(monitor.machine.contents, make_monitor))
+            self._monitor = CMonitor.from_buffer_copy(monitor)
             self._monitor.machine = ctypes.pointer(self._machines[-1].descriptor)
             self._check(self._lib.fcsl_run_use_monitor(self.handle(), byref(self._monitor), byref(self._error)))
 
