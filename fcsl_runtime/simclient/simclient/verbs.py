@@ -52,6 +52,7 @@ COMMANDS = Commands(
             _verb("rerun", _RECORDINGS, "to_rerun", "convert a bag for the rerun viewer"),
             _verb("check-bag", _RECORDINGS, "replay.check_bag", "judge the requirements of a machine on a bag"),
             _verb("trace", _MACHINES, "trace.command", "say what tests, campaigns and proofs show of each requirement"),
+            _verb("adopt", _MACHINES, "adopt", "write the values of a parameter file into a machine JSON"),
             ("fly", Verb(_RUNNING, "run a machine as a process of its own: fcsl-fc", _fly)),
             ("var", _VAR._replace(complete=_complete_var)),
             _verb("view", _RUNNING, "live.cli", "show a running machine in the rerun viewer"),
