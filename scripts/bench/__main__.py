@@ -24,6 +24,7 @@ ALONE = {
     "simulator": "simulator.main",
     "start": "start",
     "telemetry": "telemetry",
+    "times": "times",
     "twin": "twin",
     "vars": "vars.main",
     "whole": "whole.main",

@@ -38,6 +38,7 @@ from .subjects.set_up import set_up_rows, set_up_times
 from .subjects.simulator.main import simulator_figures, simulator_rows
 from .subjects.start import start_rows, start_times
 from .subjects.telemetry import telemetry_figures, telemetry_rows
+from .subjects.times import instance_time_costs, instance_time_rows
 from .subjects.twin import twin_rows, twin_times
 from .subjects.vars.main import vars_figures, vars_rows
 from .subjects.whole.main import WHOLES, whole_rows, whole_times
@@ -141,6 +142,7 @@ SECTIONS = (
     Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
     Section("requirements", "judging requirements", requirement_times, requirement_rows),
+    Section("times", "measuring instances", instance_time_costs, instance_time_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),
     Section("backends", "the backends C and Nim", backend_times, backend_rows),
     Section("checkpoint", "saving and restoring", checkpoint_times, checkpoint_rows),

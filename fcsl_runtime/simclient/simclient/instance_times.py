@@ -36,8 +36,9 @@ class InstanceTime:
 def of_stats(stats: Mapping[str, Mapping[str, int]]) -> dict[str, InstanceTime]:
     """By instance, and of the STEP: `times` of the variable server's `stats`. Empty if the machine is not measured."""
     step_ns = stats[STEP]["total_ns"] if stats else 0
+    shares = {name: row["total_ns"] / step_ns if step_ns else 0.0 for name, row in stats.items()}
     return {
-        name: InstanceTime(*(row[count] for count in _COUNTS), share=row["total_ns"] / step_ns if step_ns else 0.0)
+        name: InstanceTime(**{count: row[count] for count in _COUNTS}, share=shares[name])
         for name, row in stats.items()
     }
 
