@@ -90,7 +90,9 @@ def _add_flight(command: argparse.ArgumentParser) -> None:
 def _add_changes(command: argparse.ArgumentParser) -> None:
     """The same without the duration."""
     command.add_argument("--seed", type=_seed, metavar="N", help="random seed; replaces the file's")
-    help_set = "sets a model parameter, or an element of one: altimeter.parameters.sigma=0.8 (repeatable)"
+    help_set = (
+        "sets a parameter of a model or a controller, or an element of one: altimeter.parameters.sigma=0.8 (repeatable)"
+    )
     command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     help_event = 'adds an event: "14.0 altimeter.parameters.dropout=true", at 14 s (repeatable)'
     command.add_argument("--event", action="append", default=[], metavar="EVENT", dest="events", help=help_event)

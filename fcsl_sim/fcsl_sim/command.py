@@ -14,6 +14,7 @@ from types import FrameType
 from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.cli import missing_package
 from simclient.requirements import summary as requirement_lines
+from simclient.vars.top import table_lines
 
 from . import plot
 from .config import SERIAL_LINK, SimConfig, load
@@ -209,12 +210,6 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--timeout` needs `--external` or `--pil`: it limits the wait for the controller")
     if options.timeout is not None and external is not None and external.endswith(FREE_RUNNING):
         raise SimError("`--timeout` does not go with `,free-running`: nobody waits for the controller")
-    if options.parameters is not None and external is not None:
-        raise SimError(
-            "`--parameters` are of controllers in this process; give them to the external one: fcsl-fc --parameters"
-        )
-    if options.parameters is not None and options.restore is not None:
-        raise SimError("`--parameters` does not go with `--restore`: the checkpoint has the parameters of its flight")
     timeout_ms = TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000)))
     if options.pil is not None:
         return _fly_on_processor(options, timeout_ms)
@@ -222,6 +217,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
     config = _load(options)
+    _check_parameters(options, config)
     summary = run(
         config,
         bag=options.record,
@@ -244,8 +240,23 @@ def _run(options: argparse.Namespace) -> int:
     return EXIT_UNTIL_NOT_HELD if summary.until_held is False else 0
 
 
+def _check_parameters(options: argparse.Namespace, config: SimConfig) -> None:
+    """Raises SimError where the controllers cannot begin with those that are given."""
+    if config.plan.parameters is None:
+        return
+    what = "`--parameters`" if options.parameters is not None else "`--set` of a controller's parameter"
+    if options.external is not None:
+        raise SimError(
+            f"{what} is for controllers in this process; give them to the external one: fcsl-fc --parameters"
+        )
+    if options.restore is not None:
+        raise SimError(f"{what} does not go with `--restore`: the checkpoint has the parameters of its flight")
+    if options.pil is not None:
+        raise SimError(f"{what} does not go with `--pil`: the processor flies the compiled values")
+
+
 #: Options of `run` that need a flight which is not compared with another.
-_ONE_FLIGHT = ("parameters", "external", "record", "socket", "telemetry", "observers", "ros", "restore", "save", "speed")
+_ONE_FLIGHT = ("external", "record", "socket", "telemetry", "observers", "ros", "restore", "save", "speed")
 
 
 def _fly_on_processor(options: argparse.Namespace, timeout_ms: int) -> int:
@@ -258,7 +269,9 @@ def _fly_on_processor(options: argparse.Namespace, timeout_ms: int) -> int:
             f"`--pil` flies twice and compares; it does not go with {', '.join(others)}. A board on a serial line flies once with "
             "`--external wire:uart:DEVICE:BAUD`"
         )
-    found = compare(_load(options), options.pil, timeout_ms)
+    config = _load(options)
+    _check_parameters(options, config)
+    found = compare(config, options.pil, timeout_ms)
     if options.json:
         show(json.dumps(found.as_json(), indent=2))
     else:
@@ -320,6 +333,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         show(f"lost requests: {transition} {count}")
     for line in requirement_lines(list((summary.requirements or {}).values())):
         show(line)
+    if summary.times:
+        show("\n".join(table_lines(summary.times, config.machine.tick_hz)))
     if summary.telemetry:
         counts = summary.telemetry
         show(
@@ -344,6 +359,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
             show(f"controller {name}: lost requests: {transition} {count}")
         for line in requirement_lines(list(companion["requirements"].values())):
             show(f"controller {name}: {line}")
+        if companion["times"]:
+            show("\n".join([f"controller {name}:", *table_lines(companion["times"], config.machines[name].tick_hz)]))
     if summary.bag:
         show(f"bag: {', '.join([summary.bag, *(str(c['bag']) for c in summary.companions.values())])}")
     if summary.until_held is False:

@@ -41,17 +41,18 @@ from simclient.parameters import Given, read_parameters
 from simclient.run import open_run
 
 from . import plan
+from .controller_parameters import StartValues, controller_parameters
 from .errors import SimError
 from .event_argument import with_events
 from .extends import file_of, read_extended
 from .integrators import Integrator, read_integrator
 from .machine_model import machine_model
 from .models import ModelField, ModelTable, type_of, with_unit
-from .plan import Plan
+from .plan import Plan, Target
 from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source, source_text
 from .ros import TruthTopic
-from .set_argument import Settings, with_elements
+from .set_argument import Settings, Value, with_elements
 from .table_parameter import read_table
 from .time_comparison import time_comparison
 from .whole_ticks import whole_ticks
@@ -97,6 +98,11 @@ class SimConfig:
     warnings: tuple[str, ...]
     arguments: dict[str, Any]
 
+    @property
+    def machines(self) -> dict[str, Machine]:
+        """Those of all controllers by name; the first one leads."""
+        return {self.controller: self.machine, **{name: other.machine for name, other in self.companions.items()}}
+
     def with_seed(self, seed: int) -> SimConfig:
         """The same with another seed, without reading the file again: for many runs."""
         return replace(self, seed=seed, plan=self.plan.flown_with(seed, {}))
@@ -122,6 +128,8 @@ class _Parts:
     integrator: Integrator | None = None
     seed: int | None = None
     ticks: int | None = None
+    #: Of the command line, for parameters of controllers.
+    controller_values: dict[Target, Value] = field(default_factory=dict)
 
     @property
     def machines(self) -> dict[str, Machine]:
@@ -152,7 +160,7 @@ def load(
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
-    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it, of a model or of a controller. events, beside
     the file's: `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which
     replaces the file's. backend: language (BACKENDS) into which the file's machines are compiled. parameters: with which
     the controllers begin. Raises
@@ -267,6 +275,7 @@ class _Loader:
         file_seed = self.reader.integer(keys.get("seed"), "`seed`", 0, 2**64 - 1)
         parts.seed = file_seed if seed is None else seed
         self._read_duration(keys.get("duration"), duration_s)
+        self._read_controller_settings()
         self._report_unused_settings()
         # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
@@ -300,10 +309,15 @@ class _Loader:
             *([plan.statement("serial_link", link)] if link else []),
             *([plan.statement("views", views)] if views else []),
         ]
+        found = {name: table for name, table in tables.items() if table}
+        flown = Plan(tuple(lines), self.arguments["parameters"])
+        if parts.controller_values:
+            values = StartValues(flown, found, parts.machines).with_values(parts.controller_values)
+            flown = replace(flown, parameters=values)
         return SimConfig(
             self.file,
-            Plan(tuple(lines), self.arguments["parameters"]),
-            {name: table for name, table in tables.items() if table},
+            flown,
+            found,
             controller,
             lead.machine,
             lead.library,
@@ -604,6 +618,21 @@ class _Loader:
 
     # ---- command line ---------------------------------------------------------------------------------------------------
 
+    def _read_controller_settings(self) -> None:
+        for path, parameter in controller_parameters(self.parts.machines).items() if self.settings.left() else ():
+            whole, elements = self.settings.take_whole(path), self.settings.take_elements(path)
+            spans = [setting.span for setting in (whole, *elements) if setting]
+            if not spans or not parameter.is_settable(path, spans[0], self.sink):
+                continue
+            given: Sequence[Value | None] = [None] * parameter.field.count
+            if whole:
+                what = f"parameter `{parameter.shown.name}`"
+                given = self.reader.value(whole.value, parameter.shown.type, what, parameter.shown.unit) or given
+            changed = with_elements(given, parameter.shown, elements, self.reader)
+            values = {(*parameter.target, str(i)): value for i, value in enumerate(changed) if value is not None}
+            if parameter.is_in_range(list(values.values()), path, spans[0], self.sink):
+                self.parts.controller_values.update(values)
+
     def _report_unused_settings(self) -> None:
         instances = self.parts.instances
         for path, span in ((setting.path, setting.span) for setting in self.settings.left()):
@@ -616,8 +645,7 @@ class _Loader:
                 fix = f"give it one: in `{fields[path].role}s` of `{name}`, or by `--set {path}=[…]`"
                 self.sink.error("E211", f"`{path}` has no value of which an element can be set", span, help=fix)
                 continue
-            fix = nearest(path, list(fields))
-            machine = self.parts.machine
-            if name in self.parts.controllers or (machine and path in machine.fields):
-                fix = "`--set` sets parameters of models; those of a machine are in its own file, or `SimTwin.set` sets them"
+            fix = nearest(path, [*fields, *controller_parameters(self.parts.machines)])
+            if self.parts.machine and path in self.parts.machine.fields:
+                fix = "`--set` sets parameters, and inputs of models; `SimTwin.set` sets other values of a machine"
             self.sink.error("E210", f"there is no parameter or input `{path}`", span, help=fix)

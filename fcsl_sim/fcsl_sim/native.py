@@ -22,6 +22,7 @@ from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.parameters import CParameters
 from simclient.paths import resolve
+from simclient.instance_times import InstanceTime, read_times
 from simclient.requirements import Verdict, read_verdicts, read_violations
 from simclient.ros.composer import Composer
 from simclient.ros.publish_queue import PublishQueue
@@ -312,6 +313,11 @@ class Simulation:
         base = self._lib.fcsl_sim_machine_data(self.handle())
         return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
 
+    def controller_data(self) -> list[int]:
+        """Addresses of the structs of all controllers, the first one's first."""
+        data = self._lib.fcsl_run_data
+        return [int(data(run)) for run in (self.hosted(), *self.companion_runs().values())]
+
     def companion_runs(self) -> dict[str, int]:
         """Address of the fcsl_run_t of each controller beside the first one, by its name; as `hosted`."""
         numbers = range(self._lib.fcsl_sim_companion_count(self.handle()))
@@ -339,6 +345,10 @@ class Simulation:
     def verdicts(self, run: int | None = None) -> list[Verdict]:
         """On the requirements of the hosted machine. `run`: of the controller with this fcsl_run_t."""
         return read_verdicts(self._lib, self.hosted() if run is None else run)
+
+    def times(self, run: int | None = None) -> dict[str, InstanceTime]:
+        """Of the hosted machine's instances; empty if it is not measured. `run`: of the controller with this fcsl_run_t."""
+        return read_times(self._lib, self.hosted() if run is None else run)
 
     def violations(self) -> list[float]:
         """How often each requirement of the hosted machine was violated; NaN: not exercised."""

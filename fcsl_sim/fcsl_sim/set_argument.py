@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, Span
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode, parse_json
@@ -19,6 +20,7 @@ from .models import ModelField, type_of
 
 _OPTION = "--set"
 Value = bool | int | float | str
+Old = TypeVar("Old")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +68,11 @@ class Settings:
 
 
 def with_elements(
-    scalars: Sequence[Value], target: ModelField, settings: Sequence[Setting], reader: ConfigReader
-) -> Sequence[Value]:
+    scalars: Sequence[Old], target: ModelField, settings: Sequence[Setting], reader: ConfigReader
+) -> Sequence[Old | Value]:
     """The value of a field, row-major, with its parts replaced. E217: there is no such element."""
-    shape, changed = shape_of(target.type), list(scalars)
+    shape = shape_of(target.type)
+    changed: list[Old | Value] = list(scalars)
     for setting in settings:
         at = row_major_index(setting.index, shape)
         if at is None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Union
 
+from .descriptor import Field
 from .errors import TwinError
 
 #: What may be given: a path, or values by name, "pilot.gain"; structs and arrays as mappings and lists.
@@ -42,6 +43,12 @@ class Parameters:
     def to_c(self, name_space: str = "") -> CParameters:
         name = self.name.encode("utf-8", "surrogateescape")
         return CParameters(self.text, len(self.text), name, name_space.encode(), None)
+
+
+def parameter_name(field: Field) -> str:
+    """As a parameter file has it: `pilot.parameters.targets[0].mass` is `pilot.targets.0.mass`."""
+    name = field.path.replace(f"{field.instance}.parameters.", f"{field.instance}.", 1)
+    return name.replace("[", ".").replace("]", "")
 
 
 def read_parameters(given: Given | None) -> Parameters | None:

@@ -16,10 +16,12 @@ from simclient.twin.trace import Columns, merged, value_offsets
 
 from .. import plan
 from ..config import SimConfig
+from ..controller_parameters import StartValues
 from ..errors import SimError
 from ..native import Simulation
 from ..sim_run import SimRun
 from ..watchdog import Watchdog
+from .dispersion import Value
 from .metric import MetricError
 from .shortfall import shortfall
 from .study import Study, read_study
@@ -64,6 +66,7 @@ class Flights:
         """Raises SimError or TwinError."""
         self.study = study
         self._base = SimRun(study.config)
+        self._begin = StartValues(study.config.plan, study.config.tables, study.config.machines)
         fields = [study.machine.fields[path] for path in sorted(study.paths() | {_TICK})]
         self._ranges = merged(fields)
         self._at = value_offsets(fields, self._ranges)
@@ -91,11 +94,17 @@ class Flights:
     def config(self, case: int) -> SimConfig:
         """The simulation with the seed and the values of this case."""
         seed, values = self.study.seed_of(case), self.study.values(case)
-        bits = {
-            one.target: plan.bits(scalar_of(one.field.type).name, value)
-            for one, value in zip(self.study.parameters, values, strict=True)
-        }
-        return replace(self.study.config, seed=seed, plan=self.study.config.plan.flown_with(seed, bits))
+        bits: dict[plan.Target, str] = {}
+        of_controllers: dict[plan.Target, Value] = {}
+        for one, value in zip(self.study.parameters, values, strict=True):
+            if one.target[0] in self.study.config.machines:
+                of_controllers[one.target] = value
+            else:
+                bits[one.target] = plan.bits(scalar_of(one.field.type).name, value)
+        flown = self.study.config.plan.flown_with(seed, bits)
+        if of_controllers:
+            flown = replace(flown, parameters=self._begin.with_values(of_controllers))
+        return replace(self.study.config, seed=seed, plan=flown)
 
     def fly(self, case: int, bag: Path | None = None, watchdog: Watchdog | None = None) -> Outcome:
         """What goes wrong in a flight is its outcome. bag: records it into this new folder. watchdog: ends the process with a

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -18,6 +18,7 @@ from simclient.descriptor import Machine
 from simclient.requirements import Verdict
 
 from ..config import SimConfig, load
+from ..controller_parameters import ControllerParameter, controller_parameters
 from ..element_path import name_an_element, row_major_index, split_path
 from ..errors import SimError
 from ..models import ModelField
@@ -52,7 +53,8 @@ _DEFAULT_TIMEOUT_S = 60.0
 
 @dataclass(frozen=True)
 class Dispersed:
-    """A parameter or input of a model, or an element of one: `instance.parameters.name[2]`. `target`: what the plan sets."""
+    """A parameter or input of a model, a parameter of a controller, or an element of one: `instance.parameters.name[2]`.
+    `target`: what is set; its first word is an instance of the plan or a controller."""
 
     path: str
     field: ModelField
@@ -158,6 +160,7 @@ class _Reader:
         self.sink.raise_if_failed()
         assert seed is not None and design is not None
         print_of = hashlib.sha256("\n".join([text, str(design.count), config.plan.text]).encode())
+        print_of.update(config.plan.parameters.text if config.plan.parameters else b"")
         libraries = {config.library, *(table.library for table in config.tables.values())}
         libraries |= {companion.library for companion in config.companions.values()}
         for library in sorted(libraries):
@@ -191,40 +194,66 @@ class _Reader:
             return ()
         found = []
         settable = config.plan.targets()
+        controllers = controller_parameters(config.machines)
         for path, member in node.members.items():
-            target = self._target(path, member.key_span, config, settable)
-            if target is None:
+            whole, index = split_path(path)
+            of_controller = controllers.get(whole)
+            span = member.key_span
+            if of_controller:
+                field, owner = of_controller.shown, of_controller.target
+                if not of_controller.is_settable(path, span, self.sink):
+                    continue
+            else:
+                of_model = self._of_model(whole, span, config, controllers)
+                if of_model is None:
+                    continue
+                field, owner = of_model
+            place = self._place(whole, index, field, span)
+            if place is None:
                 continue
-            spread = self._distribution(member.value, path, scalar_of(target[0].type))
-            if spread is not None:
-                found.append(Dispersed(path, *target, spread))
+            target = *owner, str(place)
+            if not of_controller and target not in settable:
+                fix = f"give it one: in `{field.role}s` of `{owner[0]}`"
+                self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)
+                continue
+            spread = self._distribution(member.value, path, scalar_of(field.type))
+            if spread and (of_controller is None or self._in_range(spread, of_controller, path, member.value)):
+                found.append(Dispersed(path, field, target, spread))
         return tuple(found)
 
-    def _target(
-        self, path: str, span: Span, config: SimConfig, settable: set[Target]
-    ) -> tuple[ModelField, Target] | None:
-        """The field, and what the plan sets of it."""
-        whole, index = split_path(path)
+    def _of_model(
+        self, whole: str, span: Span, config: SimConfig, controllers: Iterable[str]
+    ) -> tuple[ModelField, tuple[str, str]] | None:
+        """The field, and the beginning of its target."""
         instance, _, rest = whole.partition(".")
         table = config.tables.get(instance)
         field = table.fields.get(rest) if table else None
         if field is None or field.role not in ("parameter", "input"):
             known = [f"{i}.{f.path}" for i, t in config.tables.items() for f in t.of_role("parameter", "input")]
+            known += controllers
             fix = nearest(whole, known) or f"such as `{known[0]}`" if known else "the simulation has none"
-            self.sink.error("E210", f"there is no parameter or input `{whole}` of a model", span, help=fix)
+            self.sink.error("E210", f"there is no parameter or input `{whole}`", span, help=fix)
             return None
+        return field, (instance, field.path)
+
+    def _place(self, whole: str, index: tuple[int, ...], field: ModelField, span: Span) -> int | None:
+        """Number of the element."""
         shape = shape_of(field.type)
         place = row_major_index(index, shape)
         if place is None or len(index) < len(shape):
             what = f"`{whole}` is {field.type}; a study disperses scalars"
             self.sink.error("E217", what, span, help=name_an_element(whole, shape))
             return None
-        target = instance, field.path, str(place)
-        if target not in settable:
-            fix = f"give it one: in `{field.role}s` of `{instance}`"
-            self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)
-            return None
-        return field, target
+        return place
+
+    def _in_range(self, spread: Distribution, of: ControllerParameter, path: str, node: JsonNode) -> bool:
+        """Whether all values are in the range that the algorithm declares."""
+        ends = spread.corners()
+        if ends is None and of.field.bounded:
+            why = f"the algorithm declares {of.range_text}, and a normal distribution has no bounds"
+            self.sink.error("E214", f"`{path}` needs `within`", node.span, why=why, help='add `"within": [low, high]`')
+            return False
+        return ends is None or of.is_in_range(ends, path, node.span, self.sink)
 
     def _distribution(self, node: JsonNode, path: str, scalar: Scalar) -> Distribution | None:
         keys = self.reader.object(node, f"the distribution of `{path}`", (), (*_SPREADS, "within", "weights"))
