@@ -115,7 +115,7 @@ def _run_name(machine: Machine, instance: Instance) -> str:
 
 
 def _makes_requests(instance: Instance) -> bool:
-    return ir.names_field(instance.execute.body, "outputs", "transition_request")
+    return ("outputs", "transition_request") in instance.execute.fields
 
 
 def _is_plain(instance: Instance) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import Counter
 
-from ..model import ir
 from ..model.machine import Machine
 from .names import sensors
 from .operations import KINDS, operations
@@ -25,10 +24,7 @@ def quiet_instances(machine: Machine) -> frozenset[int]:
         n
         for n, i in enumerate(machine.instances)
         if not (
-            n in guarded
-            or i.algorithm.effects
-            or i.execute.has_events
-            or ir.names_field(i.execute.body, "outputs", "health")
+            n in guarded or i.algorithm.effects or i.execute.has_events or ("outputs", "health") in i.execute.fields
         )
     )
 

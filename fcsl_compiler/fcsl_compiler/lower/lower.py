@@ -30,12 +30,14 @@ def lower(machine: Machine) -> Machine:
     program = machine.program
     for name, function in program.functions.items():
         lowering.functions[name] = lowering.function(function)
+    entries: dict[str, ir.Function] = {}  # by name: instances that are alike share them
+    for i in machine.instances:
+        if i.execute.name not in entries:
+            entries[i.execute.name] = with_undo(lowering.function(i.execute))
+        if i.start is not None and i.start.name not in entries:
+            entries[i.start.name] = lowering.function(i.start)
     instances = tuple(
-        replace(
-            i,
-            execute=with_undo(lowering.function(i.execute)),
-            start=None if i.start is None else lowering.function(i.start),
-        )
+        replace(i, execute=entries[i.execute.name], start=None if i.start is None else entries[i.start.name])
         for i in machine.instances
     )
     return replace(machine, instances=instances, program=replace(program, functions=lowering.functions))

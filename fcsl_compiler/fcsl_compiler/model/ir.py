@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from ..base.source import Span
 from .ops import Op
@@ -398,11 +399,6 @@ def records(body: tuple[Stmt, ...]) -> tuple[str, ...]:
     return tuple(r for r in RECORDS if r in used)
 
 
-def names_field(statements: tuple[Stmt, ...], record: str, name: str) -> bool:
-    """Whether a body reads or writes this field, wholly or in part."""
-    return any((record, name) in variables(e) for s in walk(statements) for e in expressions(s))
-
-
 def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]]:
     """All places that a body writes, with the value (None for the result of an effect), in source order."""
     found: list[tuple[Place, Expr | None, Span]] = []
@@ -444,11 +440,16 @@ class Function:
     loop_parameters: tuple[tuple[str, Span], ...] = ()  # parameters that bound a loop and must be frozen
     undone: tuple[Undo, ...] = ()  # in the order of the writes; made by lowering
 
-    @property
+    @cached_property
+    def fields(self) -> frozenset[tuple[str, str]]:
+        """The fields that it reads or writes, wholly or in part: record and name; "" is the record of locals."""
+        return frozenset(v for s in walk(self.body) for e in expressions(s) for v in variables(e))
+
+    @cached_property
     def uses_hardware(self) -> bool:
         return any(isinstance(s, Effect) and s.is_hardware for s in walk(self.body))
 
-    @property
+    @cached_property
     def has_events(self) -> bool:
         return any(isinstance(s, Event) for s in walk(self.body))
 

@@ -48,8 +48,11 @@ def check_effects(
         if id_ not in by_id:
             hint = nearest(id_, list(by_id)) or f"the requirements are {', '.join(by_id) or 'none'}"
             sink.error("E206", f"no requirement `{id_}`", at, help=hint)
+    actors = acting(requirements, machine)
+    if not actors:
+        return
     signals, targets = Signals(machine), {requirement.target for requirement in requirements}
-    for r in acting(requirements, machine):
+    for r in actors:
         at = guards.get(r.id, r.span)
         if r.kind == "at_end" or r.assumed:
             why = "it is judged when the run is over" if r.kind == "at_end" else "it is about the environment"

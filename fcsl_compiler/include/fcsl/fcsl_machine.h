@@ -95,7 +95,8 @@ typedef struct {
 
 /* The fields of instances that are alike, once. */
 typedef struct {
-    const fcsl_field_t *fields; /* path: what follows the name of the instance; offset: from its record; without a connection */
+    /* path: what follows the name of the instance; offset: from its record; instance and connected_from: not set */
+    const fcsl_field_t *fields;
     uint32_t field_count;
 } fcsl_fold_t;
 

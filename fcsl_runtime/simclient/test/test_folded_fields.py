@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.emit import field_table
-
 from simclient import AlgTwin, PyTwin
 from simclient.descriptor import Machine
 

@@ -121,7 +121,7 @@ class DescriptorEmitter:
     def _folded(self, folds: list[Fold], connected: dict[int, int]) -> None:
         """The tables of fcsl_folded_fields_t."""
         name = self.m.name
-        tables, uses = [], {}
+        tables, uses = list[str](), dict[int, int]()
         for number, made in enumerate(folds):
             struct = instance_type(self.m, self.m.instances[made.instances[0]])
             rows = [self._field(row, _NONE, struct) for row in made.rows]
