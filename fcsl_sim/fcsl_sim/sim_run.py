@@ -20,6 +20,7 @@ from fcsl_compiler.api.files import digest
 from fcsl_compiler.api.types import count_of, scalar_of, shape_of
 from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
+from simclient.events import Event, read_events
 from simclient.fork_safety import for_children, not_for_children
 from simclient.parameters import CParameters
 from simclient.run import Run
@@ -260,6 +261,25 @@ class SimRun(Run):
         why = f"`until` held: {self.config.until}" if held else "its duration is over"
         fix = 'extend the file with {"until": null}' if held else "give from_config() a longer `duration`"
         return f"the simulation has ended after {tick} ticks, at {tick / self.machine.tick_hz:g} s: {why}; {fix}"
+
+    def events(self) -> list[Event]:
+        """Of all controllers, by time. Instances of further controllers begin with their controller's name."""
+        found: list[Event] = []
+        for region in self._regions:
+            if region.run is not None:
+                prefix = f"{region.name}." if region.name else ""
+                own = read_events(self._lib, region.run, self._machines[region.name])
+                found += [replace(event, instance=prefix + event.instance) for event in own]
+        return sorted(found, key=lambda event: event.time_ns)
+
+    def times(self) -> dict[str, InstanceTime]:
+        """Of all controllers. Instances of further controllers begin with their controller's name."""
+        found: dict[str, InstanceTime] = {}
+        for region in self._regions:
+            if region.run is not None:
+                prefix = f"{region.name}." if region.name else ""
+                found |= {prefix + name: row for name, row in read_times(self._lib, region.run).items()}
+        return found
 
     def feed(self, samples: bytes, payloads: bytes, end: int) -> None:
         """As of Run; tick by tick in Python."""

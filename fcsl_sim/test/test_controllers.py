@@ -34,6 +34,8 @@ class Hold:
         self.ticks = self.ticks + 1
         self.u = self.gain * (self.target - self.x)
         self.seen = self.noted
+        if self.ticks % 25 == 0:
+            event("more ticks", self.ticks)
 """
 SENSE = """
 class Sense:
@@ -115,6 +117,15 @@ def expected(hz: int, delay: int, ticks: int) -> list[float]:
         commands.append(2.0 * (1.0 - x))
         x += (commands[k - delay] if k >= delay else 0.0) / hz
     return found
+
+
+def test_a_twin_has_the_events_of_all_by_time(load_two: Load, tmp_path: Path) -> None:
+    load_two()
+    with SimTwin.from_config(tmp_path / "two.sim.json") as twin:
+        twin.tick(80)
+        found = [(event.time_ns // 10**6, event.tick, event.instance, event.values) for event in twin.events]
+    first = [(240, 24, "hold", (25,)), (480, 24, "two.hold", (25,)), (490, 49, "hold", (50,))]
+    assert found == [*first, (740, 74, "hold", (75,))]
 
 
 @pytest.mark.parametrize("hz", [50, 30, 150, 1])

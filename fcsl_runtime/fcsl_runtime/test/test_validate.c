@@ -23,6 +23,7 @@ static fcsl_transition_t transitions[8];
 static const uint64_t after_ticks[8] = {5};
 static fcsl_channel_t channels[8];
 static fcsl_fault_place_t fault_places[4];
+static fcsl_event_site_t sites[3];
 
 /* A fresh, writable copy of the good descriptor. */
 static void copy_good(void)
@@ -42,6 +43,17 @@ static void copy_good(void)
     memcpy(fault_places, good->fault_places, good->fault_place_count * sizeof fault_places[0]);
     machine.channels = channels;
     machine.fault_places = fault_places;
+    for (uint32_t i = 0; i < 3; i++) {
+        sites[i] = (fcsl_event_site_t){.instance = i / 2u,
+                                       .file = "pilot.py",
+                                       .line = 7,
+                                       .text = "gate passed",
+                                       .severity = FCSL_ERROR,
+                                       .value_count = 2,
+                                       .types = {FCSL_HEALTH, FCSL_F64}};
+    }
+    machine.event_sites = sites;
+    machine.event_site_count = 3;
 }
 
 /* A name that is longer than any file's. */
@@ -168,6 +180,17 @@ static void test_damage(void)
     REFUSED(fault_places[1].file = endless(), "fault place 1");
     REFUSED(fault_places[1].cause = NULL, "fault place 1");
     REFUSED(fault_places[1].cause = "", "fault place 1");
+    REFUSED(machine.event_sites = NULL, "incomplete");
+    REFUSED(machine.event_site_count = (1u << 20) + 1u, "incomplete");
+    REFUSED(sites[1].instance = machine.instance_count, "event 1");
+    REFUSED(sites[0].instance = 1, "event 1"); /* not in the order of instances */
+    REFUSED(sites[1].file = NULL, "event 1");
+    REFUSED(sites[1].file = endless(), "event 1");
+    REFUSED(sites[1].text = "", "event 1");
+    REFUSED(sites[1].severity = FCSL_ERROR + 1, "event 1");
+    REFUSED(sites[1].value_count = FCSL_EVENT_VALUES + 1, "event 1");
+    REFUSED(sites[1].types[1] = FCSL_TRANSITION_REQUEST, "event 1");
+    REFUSED(sites[1].types[0] = FCSL_STATE, "event 1");
 }
 
 /* Whichever row it is. */

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from collections.abc import Iterable, Mapping
 from ctypes import byref
 from dataclasses import dataclass, field
 from typing import Any
@@ -61,6 +62,25 @@ def read_events(lib: Any, handle: int, machine: Machine) -> list[Event]:
             )
         )
     return found
+
+
+def of_stats(last: Iterable[Mapping[str, Any]], machine: Machine) -> list[Event]:
+    """The `last` events of a flight program (`stats` of the variable server)."""
+    types = {(machine.instances[s.instance].name, s.line, s.text): s.types for s in machine.event_sites}
+    found = []
+    for one in last:
+        known = types.get((one["instance"], one["line"], one["text"]), ())
+        values = tuple(_number(value, type_) for value, type_ in zip(one["values"], known, strict=False))
+        found.append(Event(**{**one, "values": values}, time_ns=machine.time_ns(one["tick"])))
+    return found
+
+
+def _number(value: Scalar, type_: str) -> Scalar:
+    """With the value of its type: JSON has no NaN, no infinity, and of an f32 the digits."""
+    if type_ not in ("f32", "f64"):
+        return value
+    number = float(value)
+    return float(struct.unpack("<f", struct.pack("<f", number))[0]) if type_ == "f32" else number
 
 
 def pack_values(site: EventSite, values: Any) -> list[int]:

@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 from rrd import read_rrd, values
 
 from fcsl_compiler.api.build import build_machine
-from simclient import AlgTwin, Event, PyTwin, Twin, TwinError
+from simclient import AlgTwin, Event, ProcessTwin, PyTwin, Twin, TwinError
 from simclient.bag import Bag, formats
 from simclient.replay.reproduce import Replay
 from simclient.run import open_run
@@ -73,6 +73,19 @@ def fly(twin: Twin, ticks: int = 130) -> list[Event]:
         twin.hardware.adc[3] = 1200 if 60 <= tick < 62 else 7
         twin.tick()
     return twin.events
+
+
+def test_a_flight_program_tells_a_twin(tmp_path: Path) -> None:
+    path = config(tmp_path)
+    with AlgTwin.from_config(path) as twin, ProcessTwin.from_config(path) as process:
+        for one in (twin, process):
+            one.set_many(
+                {"a.inputs.gate": 3, "a.inputs.speed": 0.1, "b.inputs.gate": 2, "b.inputs.speed": float("inf")}
+            )
+            one.tick(12)
+        events = twin.events
+        assert process.events == events and len(events) == 22
+    assert [e.values[1] for e in events if e.text == "gate passed"] == [pytest.approx(0.1), float("inf")]
 
 
 def texts(events: list[Event], instance: str) -> list[tuple[int, str, tuple[Any, ...]]]:
@@ -203,7 +216,8 @@ def test_a_flight_program_prints_and_serves_them(tmp_path: Path) -> None:
     counts = {"told": 31, "suppressed": 25, "lost": 0}  # ten of 30 and of 15 `ran`, one gate, ten `read`
     assert code == 0 and {name: served[name] for name in counts} == counts
     gate = {"tick": 0, "severity": "warning", "instance": "a", "message": "gate passed 3 0 true"}
-    assert served["last"][0] == {**gate, "file": "law.py", "line": 11}
+    gate |= {"text": "gate passed", "values": [3, 0, True], "suppressed": 0, "file": "law.py", "line": 11}
+    assert served["last"][0] == gate
     assert len(served["last"]) == 31 and json.loads(summary.read_text())["events"] == served
     assert "fcsl-fc: warning: 'a': gate passed 3 0 true (tick 0, law.py:11)\n" in err
     assert "fcsl-fc: 'io': read 3 (tick 2)\n" in out and "'a': ran" not in out + err

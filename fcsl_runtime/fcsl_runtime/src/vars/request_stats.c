@@ -3,7 +3,9 @@
  * The command `stats`: what the host, the machine and the server count.
  */
 #include <inttypes.h>
+#include <string.h>
 
+#include "machine/event_text.h"
 #include "machine/fault_place.h"
 #include "run/lost_requests.h"
 #include "protocol.h"
@@ -134,6 +136,20 @@ void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const u
     fcsl_vars_end(out);
 }
 
+/* As numbers, true and false; the others as texts. */
+static void put_values(fcsl_vars_out_t *out, const fcsl_event_site_t *site, const uint64_t *values)
+{
+    fcsl_json_raw(out, ",\"values\":[");
+    for (uint32_t i = 0; i < site->value_count; i++) {
+        char text[SCALAR_TEXT_BYTES];
+        fcsl_event_value_text(site->types[i], values[i], text);
+        const int is_word = site->types[i] == FCSL_HEALTH || strspn(text, "-infa") == strlen(text);
+        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_raw(out, is_word ? "\"%s\"" : "%s", text);
+    }
+    fcsl_json_raw(out, "]");
+}
+
 static void put_event(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const fcsl_told_event_t *event)
 {
     const fcsl_event_site_t *site = &machine->event_sites[event->site];
@@ -144,6 +160,10 @@ static void put_event(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const
     fcsl_json_quoted(out, machine->instances[site->instance].name);
     fcsl_json_raw(out, ",\"message\":");
     fcsl_json_quoted(out, text);
+    fcsl_json_raw(out, ",\"text\":");
+    fcsl_json_quoted(out, site->text);
+    put_values(out, site, event->values);
+    fcsl_vars_number(out, "suppressed", event->suppressed);
     fcsl_json_raw(out, ",\"file\":");
     fcsl_json_quoted(out, site->file);
     fcsl_json_raw(out, ",\"line\":%" PRIu32 "}", site->line);

@@ -148,9 +148,9 @@ class TwinHost(ABC):
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         """One sample of a sensor channel for the next tick."""
 
+    @abstractmethod
     def _events(self) -> list[Event]:
         """The last events of the machine."""
-        raise TwinError(f"{type(self).__name__} does not read events")
 
     def _times(self) -> dict[str, InstanceTime]:
         """How long instances, and steps, took so far; empty if the machine is not measured."""

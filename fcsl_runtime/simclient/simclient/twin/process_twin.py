@@ -32,6 +32,7 @@ from .twin import Twin
 
 if TYPE_CHECKING:
     from ..instance_times import InstanceTime
+    from ..events import Event
     from ..requirements import Verdict
     from .profile import Samples
 
@@ -144,6 +145,12 @@ class ProcessTwin(Twin):
         from ..instance_times import of_stats
 
         return of_stats(self._request("stats").get("times", {}))
+
+    def _events(self) -> list[Event]:
+        """The last 64, as the program's `stats` has them."""
+        from ..events import of_stats
+
+        return of_stats(self._request("stats").get("events", {}).get("last", ()), self.machine)
 
     def _verdicts(self) -> list[Verdict]:
         """As the program's `stats` has them: without the values of a violation."""

@@ -232,7 +232,7 @@ class Twin(TwinFaults):
 
     @property
     def events(self) -> list[Event]:
-        """What the algorithms have reported with `event(…)` since init, in order: the last 1024 (events.py).
+        """What the algorithms have reported with `event(…)` since init, in order: the last 1024, of a ProcessTwin 64 (events.py).
 
         Of one place of one instance ten are told in each second of the machine; the next one says how many were suppressed.
         """
