@@ -72,6 +72,71 @@ static const fcsl_ros_reader_plan_t CONVERSION = {
     .stamp_anchor = 0,
 };
 
+/* Of the same message by what else there is: the frame among two (value 3), position of up to four (0) and its length (1), the
+ * number of items of pairs[label=abcd] (2), the mode among two numbers (4). */
+enum { SEARCH_VALUES = 5 };
+static const fcsl_ros_part_t SEARCH_PARTS[] = {
+    {FCSL_ROS_BLOCK, 8, 8, 0, 0},
+    {FCSL_ROS_CHOICE, 0, 1, 0, 2},
+    {FCSL_ROS_NAMES, 0, 0, 0, 0},
+    {FCSL_ROS_SEQUENCE, 8, 8, 0, 2},
+    {FCSL_ROS_FIND, 0, 4, 11, 1}, /* 4 */
+    {FCSL_ROS_KEY, 0, 0, 2, 0},
+    {FCSL_ROS_COUNT, 0, 0, 4, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 10, 0}, /* 7 */
+    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_END, 0, 0, 7, 0},
+    {FCSL_ROS_FOUND, 0, 0, 4, 0},
+    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 20, 0}, /* 13 */
+    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 19, 0}, /* 16 */
+    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_END, 0, 0, 16, 0},
+    {FCSL_ROS_END, 0, 0, 13, 0},
+    {FCSL_ROS_BLOCK, 2, 4, 5, 0},
+    {FCSL_ROS_BLOCK, 8, 24, FCSL_ROS_NONE, 0},
+};
+static const fcsl_ros_pick_t SEARCH_PICKS[] = {{2, 4, 1, FCSL_ROS_NONE}, {3, 0, FCSL_ROS_NONE, FCSL_ROS_NONE}};
+static const char *const SEARCH_NAMES[] = {"map", "base", "abcd"};
+static const int64_t SEARCH_CHOICES[] = {9, 6};
+static const fcsl_ros_term_t SEARCH_TERMS[] = {
+    {1.0, 2, 0, FCSL_ROS_F64}, {1.0, 3, 0, FCSL_ROS_U32}, {1.0, 4, 0, FCSL_ROS_U32},
+    {1.0, 1, 0, FCSL_ROS_U32}, {1.0, 5, 2, FCSL_ROS_U16},
+};
+static const fcsl_ros_row_t SEARCH_ROWS[] = {
+    {0, 1, 0, FCSL_ROS_F64, 0, 0.0, 0.0, 3},  {1, 1, 32, FCSL_ROS_U32, 0, 0.0, 0.0, 0},
+    {2, 1, 36, FCSL_ROS_U32, 0, 0.0, 0.0, 0}, {3, 1, 40, FCSL_ROS_U32, 0, 0.0, 0.0, 0},
+    {4, 1, 44, FCSL_ROS_I32, 0, 0.0, 0.0, 0},
+};
+static const fcsl_ros_value_t SEARCH_ROW_VALUES[SEARCH_VALUES] = {{0, 32, 0, 1, 0, 0, 0, 1, 0, 0},
+                                                                  {32, 4, 1, 1, 0, 0, 0, 0, 0, 0},
+                                                                  {36, 4, 2, 1, 0, 0, 0, 0, 0, 0},
+                                                                  {40, 4, 3, 1, 0, 0, 0, 0, FCSL_ROS_NONE, 2},
+                                                                  {44, 4, 4, 1, 0, 0, 0, 0, 0, 2}};
+static const fcsl_ros_reader_plan_t SEARCH = {
+    .parts = SEARCH_PARTS,
+    .picks = SEARCH_PICKS,
+    .names = SEARCH_NAMES,
+    .values = SEARCH_ROW_VALUES,
+    .rows = SEARCH_ROWS,
+    .terms = SEARCH_TERMS,
+    .choices = SEARCH_CHOICES,
+    .part_count = COUNT_OF(SEARCH_PARTS),
+    .pick_count = COUNT_OF(SEARCH_PICKS),
+    .name_count = COUNT_OF(SEARCH_NAMES),
+    .value_count = SEARCH_VALUES,
+    .row_count = COUNT_OF(SEARCH_ROWS),
+    .term_count = COUNT_OF(SEARCH_TERMS),
+    .choice_count = COUNT_OF(SEARCH_CHOICES),
+    .anchor_count = 6,
+    .size = 48,
+    .stamp_anchor = 0,
+};
+
 static void put_double(fcsl_cdr_t *cdr, double value)
 {
     uint64_t bits = 0;

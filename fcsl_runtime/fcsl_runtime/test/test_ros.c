@@ -152,6 +152,137 @@ static int conversion_is_refused(const fcsl_ros_reader_plan_t *conversion)
         CHECK(conversion_is_refused(&conversion));                                                                     \
     } while (0)
 
+#define WRONG_SEARCH(table, field, index, member, value)                                                               \
+    do {                                                                                                               \
+        memcpy(copy_of_##field, table, sizeof copy_of_##field);                                                        \
+        copy_of_##field[index].member = (value);                                                                       \
+        fcsl_ros_reader_plan_t conversion = SEARCH;                                                                    \
+        conversion.field = copy_of_##field;                                                                            \
+        CHECK(conversion_is_refused(&conversion));                                                                     \
+    } while (0)
+
+static void test_plans_of_searches(void)
+{
+    fcsl_ros_part_t copy_of_parts[COUNT_OF(SEARCH_PARTS)];
+    fcsl_ros_pick_t copy_of_picks[COUNT_OF(SEARCH_PICKS)];
+    fcsl_ros_row_t copy_of_rows[COUNT_OF(SEARCH_ROWS)];
+    fcsl_ros_value_t copy_of_values[SEARCH_VALUES];
+    WRONG_SEARCH(SEARCH_PARTS, parts, 1, size, 6);              /* an anchor that is none */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 1, count, 4);             /* names that there are not */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 4, first, 10);            /* a search without its end */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 4, count, 3);             /* it clears anchors that there are not */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 4, size, 5);              /* it does not clear what it sets */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 5, code, FCSL_ROS_STRING); /* without a key: a turn that takes nothing */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 5, first, 3);
+    WRONG_SEARCH(SEARCH_PARTS, parts, 8, code, FCSL_ROS_KEY);   /* a key in a loop */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 8, code, FCSL_ROS_CHOICE);
+    WRONG_SEARCH(SEARCH_PARTS, parts, 11, first, 3);
+    WRONG_SEARCH(SEARCH_PARTS, parts, 14, code, FCSL_ROS_FIND); /* a search in a loop */
+    WRONG_SEARCH(SEARCH_PARTS, parts, 15, first, 5);            /* a length in a loop */
+    WRONG_SEARCH(SEARCH_PICKS, picks, 0, element, 0);           /* its value expects fewer */
+    WRONG_SEARCH(SEARCH_PICKS, picks, 0, count, 3);
+    WRONG_SEARCH(SEARCH_ROWS, rows, 4, type, FCSL_ROS_F32);     /* an index is an integer */
+    WRONG_SEARCH(SEARCH_ROW_VALUES, values, 0, limited, 0);
+    WRONG_SEARCH(SEARCH_ROW_VALUES, values, 1, limited, 1);
+    WRONG_SEARCH(SEARCH_ROW_VALUES, values, 4, choice_count, 3);
+    WRONG_SEARCH(SEARCH_ROW_VALUES, values, 4, size, 3);
+}
+
+typedef struct {
+    double position[4];
+    uint32_t length;
+    uint32_t items;
+    uint32_t frame;
+    int32_t mode;
+} search_row_t;
+
+static void test_searches(void)
+{
+    fcsl_error_t error;
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&SEARCH, &error);
+    uint8_t message[MESSAGE_MAX];
+    uint8_t status[SEARCH_VALUES];
+    search_row_t row;
+    int64_t stamp_ns = 0;
+    const size_t size = make_message(message);
+    CHECK(reader != NULL);
+    counting = 1;
+    CHECK(fcsl_ros_read(reader, message, size, (uint8_t *)&row, status, &stamp_ns) == FCSL_ROS_TAKEN);
+    counting = 0;
+    CHECK(allocations == 0 && row.position[2] == 12.0 && row.position[3] == 0.0 && row.length == 3);
+    CHECK(row.items == 2 && row.frame == 1 && row.mode == 1);
+    message[armed_at + 2] = 7;
+    message[16] = 'c'; /* of "base" */
+    CHECK(fcsl_ros_read(reader, message, size, (uint8_t *)&row, status, &stamp_ns) == FCSL_ROS_TAKEN);
+    CHECK(status[3] == FCSL_ROS_UNKNOWN && status[4] == FCSL_ROS_UNKNOWN && status[2] == FCSL_ROS_TAKEN);
+    for (size_t i = 0; i < size; i++) {
+        uint8_t cut[MESSAGE_MAX];
+        memcpy(cut, message, size);
+        CHECK(fcsl_ros_read(reader, cut, i, (uint8_t *)&row, status, &stamp_ns) != FCSL_ROS_TAKEN);
+        cut[i] ^= 0x55u;
+        const fcsl_ros_status_t whole = fcsl_ros_read(reader, cut, size, (uint8_t *)&row, status, &stamp_ns);
+        CHECK(whole != FCSL_ROS_TAKEN || status[0] == FCSL_ROS_TAKEN || status[0] == FCSL_ROS_SHAPE ||
+              status[0] == FCSL_ROS_NAN);
+    }
+    fcsl_ros_reader_free(reader);
+}
+
+/* A message with a string that is chosen and a list of up to three doubles: a block, "on" or "offline", f64[], u8. */
+static void test_messages_of_different_lengths(void)
+{
+    static const uint8_t text[68] = {0, 1, 0, 0, 7, 0, 0, 0, 8, 0, 0, 0, [20] = 3, [52] = 9};
+    static const fcsl_ros_term_t terms[] = {{1.0, 0, 0, FCSL_ROS_U32}, {1.0, 0, 8, FCSL_ROS_F64}};
+    static const fcsl_ros_row_t rows[] = {{0, 1, 20, FCSL_ROS_U32, 0, 0, 0, 0}, {1, 1, 28, FCSL_ROS_F64, 0, 0, 0, 2}};
+    static const fcsl_ros_choice_t choices[] = {{{1.0, 0, 4, FCSL_ROS_I32}, 8, FCSL_ROS_TEXT, 0, 2}};
+    static const char *const names[] = {"on", "offline"};
+    fcsl_ros_segment_t segments[] = {{0, 4, 1, 0},  {4, 8, 8, 0},   {12, 8, 1, 1},
+                                     {20, 4, 4, 0}, {28, 24, 8, 8}, {52, 1, 1, 0}};
+    const fcsl_ros_composer_plan_t conversion = {.text = text,
+                                                 .rows = rows,
+                                                 .terms = terms,
+                                                 .choices = choices,
+                                                 .names = names,
+                                                 .segments = segments,
+                                                 .size = 53,
+                                                 .row_count = 2,
+                                                 .term_count = 2,
+                                                 .choice_count = 1,
+                                                 .name_count = 2,
+                                                 .segment_count = 6,
+                                                 .memory_count = 1,
+                                                 .stamp_offset = FCSL_ROS_NONE};
+    struct {
+        uint32_t count;
+        int32_t index;
+        double numbers[3];
+    } memory = {2, 0, {1.0, 2.0, 3.0}};
+    const uint8_t *const memories[] = {(const uint8_t *)&memory};
+    uint8_t out[sizeof text];
+    uint32_t size = 0;
+    double number = 0.0;
+    fcsl_error_t error;
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&conversion, &error);
+    CHECK(composer != NULL);
+    CHECK(fcsl_ros_compose(composer, memories, 0, out, &size) == FCSL_ROS_TAKEN);
+    memcpy(&number, out + 28, sizeof number); /* behind "on\0", a byte of padding and the length */
+    CHECK(size == 37 && out[8] == 3 && memcmp(out + 12, "on", 3) == 0 && out[16] == 2 && number == 2.0 && out[36] == 9);
+    memory.count = 0;
+    memory.index = 1;
+    CHECK(fcsl_ros_compose(composer, memories, 0, out, &size) == FCSL_ROS_TAKEN && size == 25);
+    memory.count = 4;
+    CHECK(fcsl_ros_compose(composer, memories, 0, out, &size) == FCSL_ROS_RANGE);
+    memory.count = UINT32_MAX / 8u + 2u; /* times 8: wraps to 8 in 32 bits */
+    CHECK(fcsl_ros_compose(composer, memories, 0, out, &size) == FCSL_ROS_RANGE);
+    memory.index = -1;
+    CHECK(fcsl_ros_compose(composer, memories, 0, out, &size) == FCSL_ROS_UNKNOWN);
+    fcsl_ros_composer_free(composer);
+    segments[3].offset = 19; /* over the one before */
+    CHECK(fcsl_ros_composer_new(&conversion, &error) == NULL);
+    segments[3].offset = 20;
+    segments[0].element = 1; /* without a length before it */
+    CHECK(fcsl_ros_composer_new(&conversion, &error) == NULL);
+}
+
 static void test_plans(void)
 {
     fcsl_ros_part_t copy_of_parts[COUNT_OF(PARTS)];
@@ -313,7 +444,7 @@ static void test_composing(void)
 
 int main(int argc, char **argv)
 {
-    CHECK(argc == 2 && sizeof(row_t) == 40);
+    CHECK(argc == 2 && sizeof(row_t) == 40 && sizeof(search_row_t) == 48);
     fcsl_error_t error = {{0}};
     fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&CONVERSION, &error);
     CHECK(reader != NULL);
@@ -324,6 +455,9 @@ int main(int argc, char **argv)
     test_many(reader);
     fcsl_ros_reader_free(reader);
     test_plans();
+    test_plans_of_searches();
+    test_searches();
+    test_messages_of_different_lengths();
     test_sample_input(argv[1]);
     test_composing();
     return 0;

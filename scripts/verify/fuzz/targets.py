@@ -206,7 +206,7 @@ TARGETS = (
         "ROS 2",
         Defect(
             f"{_HAL}/ros/ros_walk.c",
-            "walk->anchors[pick->anchor] = pick->count == count ? numbers : NULL;",
+            "walk->anchors[pick->anchor] = fits ? numbers : NULL;",
             "walk->anchors[pick->anchor] = numbers;",
         ),
         longest=2048,

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl_ros.h: reading messages. Input: number of patches (1), patches of the conversion's tables (which table, then as fuzz.h
+ * fcsl_ros.h: reading messages. Input: which conversion and number of patches (1), patches of its tables (which table, then as fuzz.h
  * says), a message. A conversion that is refused is none; whatever is accepted reads any message.
  */
 #include "fuzz.h"
 #include "ros_conversion.h"
-
-enum { PARTS_MAX = COUNT_OF(PARTS), FIELDS_OFFSET = offsetof(fcsl_ros_reader_plan_t, part_count) };
 
 /* Tables of one conversion, of exactly their size. */
 typedef struct {
@@ -27,19 +25,22 @@ static void *copy_of(const void *table, size_t size)
 
 static void open_tables(tables_t *p, bytes_t *bytes)
 {
-    p->parts = copy_of(PARTS, sizeof PARTS);
-    p->picks = copy_of(PICKS, sizeof PICKS);
-    p->values = copy_of(ROW_VALUES, sizeof ROW_VALUES);
-    p->rows = copy_of(ROWS, sizeof ROWS);
-    p->terms = copy_of(TERMS, sizeof TERMS);
-    p->conversion = CONVERSION;
-    const uint64_t patches = take_number(bytes, 1) % 8u;
+    const uint64_t head = take_number(bytes, 1);
+    const fcsl_ros_reader_plan_t *plan = head < 128u ? &CONVERSION : &SEARCH;
+    const uint64_t patches = head % 8u;
+    p->parts = copy_of(plan->parts, plan->part_count * sizeof *plan->parts);
+    p->picks = copy_of(plan->picks, plan->pick_count * sizeof *plan->picks);
+    p->values = copy_of(plan->values, plan->value_count * sizeof *plan->values);
+    p->rows = copy_of(plan->rows, plan->row_count * sizeof *plan->rows);
+    p->terms = copy_of(plan->terms, plan->term_count * sizeof *plan->terms);
+    p->conversion = *plan;
     for (uint64_t i = 0; i < patches; i++) {
         uint32_t numbers[] = {p->conversion.anchor_count, p->conversion.size, p->conversion.stamp_anchor,
                               p->conversion.stamp_offset};
         void *const tables[] = {p->parts, p->picks, p->values, p->rows, p->terms, numbers};
-        const size_t sizes[] = {sizeof PARTS, sizeof PICKS, sizeof ROW_VALUES,
-                                sizeof ROWS,  sizeof TERMS, sizeof numbers};
+        const size_t sizes[] = {plan->part_count * sizeof *plan->parts,   plan->pick_count * sizeof *plan->picks,
+                                plan->value_count * sizeof *plan->values, plan->row_count * sizeof *plan->rows,
+                                plan->term_count * sizeof *plan->terms,   sizeof numbers};
         const size_t which = (size_t)take_number(bytes, 1) % 6u;
         patch_words(bytes, tables[which], sizes[which], 1);
         p->conversion.anchor_count = numbers[0];
@@ -63,16 +64,16 @@ static void close_tables(tables_t *p)
     free(p->terms);
 }
 
-static void read_message(fcsl_ros_reader_t *reader, uint32_t row_size, bytes_t *bytes)
+static void read_message(fcsl_ros_reader_t *reader, const fcsl_ros_reader_plan_t *conversion, bytes_t *bytes)
 {
     size_t size = bytes->left;
     uint8_t *message = take_copy(bytes, &size);
-    uint8_t *row = malloc(row_size);
-    uint8_t status[VALUES] = {0};
+    uint8_t *row = malloc(conversion->size);
+    uint8_t status[SEARCH_VALUES] = {0};
     int64_t stamp_ns = -1;
     const fcsl_ros_status_t whole = fcsl_ros_read(reader, message, size, row, status, &stamp_ns);
     FUZZ_CHECK(whole < FCSL_ROS_STATUSES && stamp_ns >= 0);
-    for (uint32_t i = 0; i < VALUES; i++) {
+    for (uint32_t i = 0; i < conversion->value_count; i++) {
         FUZZ_CHECK(whole == FCSL_ROS_TAKEN ? status[i] < FCSL_ROS_STATUSES : status[i] == whole);
     }
     free(row);
@@ -88,7 +89,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&p.conversion, &error);
     FUZZ_CHECK((reader == NULL) == (error.text[0] != '\0'));
     if (reader != NULL) {
-        read_message(reader, p.conversion.size, &bytes);
+        read_message(reader, &p.conversion, &bytes);
     }
     fcsl_ros_reader_free(reader);
     close_tables(&p);
