@@ -19,10 +19,10 @@ from simclient.c_machine import CMachine
 from simclient.c_run import VERDICTS, CError
 from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
+from simclient.instance_times import InstanceTime, read_times
 from simclient.library import bind
 from simclient.parameters import CParameters
 from simclient.paths import resolve
-from simclient.instance_times import InstanceTime, read_times
 from simclient.requirements import Verdict, read_verdicts, read_violations
 from simclient.ros.composer import Composer
 from simclient.ros.publish_queue import PublishQueue

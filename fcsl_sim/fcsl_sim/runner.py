@@ -13,6 +13,7 @@ from typing import Any
 
 from simclient.checkpoint import read_checkpoint, write_checkpoint
 from simclient.errors import TwinError
+from simclient.instance_times import InstanceTime
 from simclient.requirements import Verdict
 from simclient.requirements import as_json as verdict_as_json
 
@@ -44,9 +45,10 @@ class StateChange:
 class Summary:
     """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or
     `until`; `until_held` is None without a stop condition; `time_s` is when the next tick would be. `lost_requests` counts
-    by transition, without the zeros; `requirements` has their verdicts by id; both None with an external controller. `truth` maps `<instance>.outputs.<field>` to its
+    by transition, without the zeros; `requirements` has their verdicts by id, `times` those of its instances, empty if it is not measured;
+    all None with an external controller. `truth` maps `<instance>.outputs.<field>` to its
     value in the last tick, at `truth_time_s`. `companions` are the controllers beside the first one: `state`, `ticks`,
-    `lost_requests`, `requirements`, `bag`.
+    `lost_requests`, `requirements`, `times`, `bag`.
     """
 
     config: str
@@ -62,6 +64,7 @@ class Summary:
     transitions: list[StateChange]
     lost_requests: dict[str, int] | None
     requirements: dict[str, Verdict] | None
+    times: dict[str, InstanceTime] | None
     companions: dict[str, dict[str, Any]]
     truth_time_s: float
     truth: dict[str, Scalar | list[Scalar]]
@@ -243,6 +246,7 @@ def _companions(sim: Simulation, bag: Path | None) -> dict[str, dict[str, Any]]:
             "ticks": ticks,
             "lost_requests": sim.lost_requests(runs[name]),
             "requirements": {verdict.id: verdict for verdict in sim.verdicts(runs[name])},
+            "times": sim.times(runs[name]),
             "bag": f"{bag}_{name}" if bag else None,
         }
         for name, (state, ticks) in sim.companions().items()
@@ -307,6 +311,7 @@ def _summary(
         transitions=flight.changes,
         lost_requests=sim.lost_requests() if flight.state is not None else None,
         requirements={verdict.id: verdict for verdict in sim.verdicts()} if flight.state is not None else None,
+        times=sim.times() if flight.state is not None else None,
         companions=_companions(sim, bag),
         truth_time_s=sim.machine.time_ns(max(sim.tick - 1, 0)) / 1e9,
         truth={

@@ -22,6 +22,7 @@ from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.events import Event, read_events
 from simclient.fork_safety import for_children, not_for_children
+from simclient.instance_times import InstanceTime, read_times
 from simclient.parameters import CParameters
 from simclient.run import Run
 

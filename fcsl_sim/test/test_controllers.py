@@ -15,6 +15,9 @@ import pytest
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
+from fcsl_sim.cli import main
+from fcsl_sim.runner import run
+from fcsl_sim.sim_run import SimRun
 from fcsl_sim.sim_twin import SimTwin
 from simclient import AlgTwin
 from simclient.bag import Bag, columns
@@ -381,3 +384,31 @@ def test_controllers_that_are_refused(change: Callable[[dict[str, Any]], object]
     with pytest.raises(DiagnosticError) as error:
         load_two(change)
     assert message in [f"{d.code}: {d.message}" for d in error.value.diagnostics]
+
+
+def test_times_of_all_controllers(
+    load_two: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of machines built with --times: at the end of a run, and of a twin."""
+    assert run(load_two()).times == {}
+    monkeypatch.setenv("FCSL_TIMES", "1")
+    config = load_two()
+    with SimTwin(SimRun(config)) as twin:
+        twin.tick(10)
+        runs = {name: row.runs for name, row in twin.instance_times().items()}
+    own, other = (
+        {f"{prefix}{name}": n for name in ("sense", "hold", "machine")} for prefix, n in (("", 10), ("two.", 5))
+    )
+    assert runs == own | other
+    assert main(["run", str(config.path), "--duration", "1"]) == 0
+    shown = capsys.readouterr()
+    table = (shown.out + shown.err).splitlines()
+    assert [line.split()[:2] for line in table if line.startswith(("hold", "step"))] == [
+        ["hold", "100"],
+        ["step", "100"],
+        ["hold", "50"],
+        ["step", "50"],
+    ]
+    assert main(["run", str(config.path), "--duration", "1", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["times"]["hold"]["runs"] == 100 and summary["companions"]["two"]["times"]["hold"]["runs"] == 50

@@ -52,7 +52,12 @@ def _ask(client: VarClient) -> tuple[dict[str, Any], Times]:
 
 
 def lines(stats: Mapping[str, Any], times: Times, before: Times | None, tick_hz: float) -> list[str]:
-    """The table, largest share first. Shares are of the time since `before`, or since the run began."""
+    """What the host counts, and the table."""
+    return [status_text(dict(stats)), *_host(stats), "", *table_lines(times, tick_hz, before)]
+
+
+def table_lines(times: Times, tick_hz: float, before: Times | None = None) -> list[str]:
+    """The largest share first. Shares are of the time since `before`, or since the run began."""
     spent = {name: row.total_ns - (before[name].total_ns if before else 0) for name, row in times.items()}
     step_ns = spent.pop(STEP)
     rest = step_ns - sum(spent.values())
@@ -61,8 +66,7 @@ def lines(stats: Mapping[str, Any], times: Times, before: Times | None, tick_hz:
     rows.append([_REST, *[""] * 5, _share(rest, step_ns)])
     step = times[STEP]
     rows.append(["step", *_figures(step), f"{100e-9 * step.mean_ns * tick_hz:.2f} % of the period"])
-    head = [status_text(dict(stats)), *_host(stats)]
-    return [*head, "", *_right([list(_HEAD), *rows]).splitlines()]
+    return _right([list(_HEAD), *rows]).splitlines()
 
 
 def _host(stats: Mapping[str, Any]) -> list[str]:
