@@ -107,6 +107,8 @@ def _add_parameters(command: argparse.ArgumentParser) -> None:
 
 def _add_run(command: argparse.ArgumentParser) -> None:
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
+    help_split = "split the bag by some of seconds=60,megabytes=100,files=10,around=30 (docs/guide/recording.md)"
+    command.add_argument("--record-split", metavar="SPLIT", default="", help=help_split)
     command.add_argument(
         "--namespace",
         metavar="NAMESPACE",

@@ -206,6 +206,8 @@ def _run(options: argparse.Namespace) -> int:
             "`--namespace` needs `--record`, `--observers`, `--ros` or `--external zenoh:…`: it is of topics, and of keys "
             "of the bus"
         )
+    if options.record_split and options.record is None:
+        raise SimError("`--record-split` needs `--record`: it splits the bag")
     if options.timeout is not None and external is None and options.pil is None:
         raise SimError("`--timeout` needs `--external` or `--pil`: it limits the wait for the controller")
     if options.timeout is not None and external is not None and external.endswith(FREE_RUNNING):
@@ -221,6 +223,7 @@ def _run(options: argparse.Namespace) -> int:
     summary = run(
         config,
         bag=options.record,
+        split=options.record_split,
         name_space=options.namespace,
         external=external,
         timeout_ms=timeout_ms,

@@ -89,7 +89,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_tick": (c_uint64, [ptr]),
     "fcsl_sim_ticks": (c_uint64, [ptr]),
     "fcsl_sim_status": (c_int, [ptr]),
-    "fcsl_sim_record": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
+    "fcsl_sim_record": (c_int, [ptr, c_char_p, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_record_stop": (c_int, [ptr, _ERROR]),
     "fcsl_sim_run": (c_int64, [ptr, c_uint64, _ERROR]),
     "fcsl_sim_run_traced": (c_int, [ptr, c_uint64, POINTER(_Part), c_uint32, ptr, POINTER(c_uint64), _ERROR]),
@@ -376,12 +376,12 @@ class Simulation:
         """
         self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
-    def record(self, bag: Path, name_space: str = "") -> None:
+    def record(self, bag: Path, name_space: str = "", split: str = "") -> None:
         """Records controller and truth into `bag`, from the next tick on. name_space: with or without surrounding
-        slashes.
+        slashes. split: how the bag is split into files (docs/guide/recording.md).
         """
-        within = name_space.strip("/").encode()
-        self._check(self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), within, byref(self._error)))
+        within, files = name_space.strip("/").encode(), split.encode()
+        self._check(self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), within, files, byref(self._error)))
 
     def record_stop(self) -> None:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))

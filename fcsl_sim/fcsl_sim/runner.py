@@ -131,6 +131,7 @@ def run(
     config: SimConfig,
     *,
     bag: Path | None = None,
+    split: str = "",
     name_space: str = "",
     external: str | None = None,
     timeout_ms: int = TIMEOUT_MS,
@@ -143,7 +144,7 @@ def run(
     restore: Path | None = None,
     save: Path | None = None,
 ) -> Summary:
-    """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
+    """Runs to the end. bag: records controller and truth into this new directory, split into files by `split`. external: the controller is another
     process (`wire:SPEC` or `zenoh:tcp:HOST:PORT`), which records itself and answers within `timeout_ms`; with
     `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the
     keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. observers: the machine's channels
@@ -183,7 +184,7 @@ def run(
             watcher.listening()
             _await_controller(sim, timeout_ms)
         if bag is not None:
-            sim.record(bag, name_space)
+            sim.record(bag, name_space, split)
         if address is not None:
             watcher.serving(address)
         try:

@@ -343,10 +343,10 @@ class SimRun(Run):
 
     # ---- recording --------------------------------------------------------------------------------------------------
 
-    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
+    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None, split: str = "") -> None:
         self.handle()
         with twin_errors():
-            self._simulation.record(bag, name_space)
+            self._simulation.record(bag, name_space, split)
         not_for_children(self)
 
     def record_stop(self) -> None:

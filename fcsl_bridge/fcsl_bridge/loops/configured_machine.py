@@ -45,7 +45,7 @@ class ConfiguredMachine:
     TwinError, and then leaves nothing behind."""
 
     def __init__(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed):
-        self._node, self._record = node, options["record"]
+        self._node, self._record, self._split = node, options["record"], options["record_split"]
         self._lossless = options["mode"] == "lockstep"
         self.bag: Path | None = None  #: the newest one, unless it failed
         self._recording = False
@@ -88,7 +88,8 @@ class ConfiguredMachine:
         if not self._record or self._recording:
             return
         bag = next_bag(self._record)
-        self.run.record(bag, self._node.get_namespace().strip("/"), lossless=self._lossless)
+        name_space = self._node.get_namespace().strip("/")
+        self.run.record(bag, name_space, lossless=self._lossless, split=self._split)
         self.bag, self._recording = bag, True
 
     def end_record(self) -> None:

@@ -54,6 +54,7 @@ OPTIONS = (  # all read-only: callers of the node's services must not load libra
         "mode", str, "lockstep", "what triggers the ticks: lockstep (a simulator), realtime (time) or clock (/clock)"
     ),
     Option("record", str, "", "the path of a new bag directory; if it exists, <record>_2, ..."),
+    Option("record_split", str, "", "how the bag is split: some of seconds=60,megabytes=100,files=10,around=30"),
     Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
     bus_address.OPTION,
     Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next tick"),

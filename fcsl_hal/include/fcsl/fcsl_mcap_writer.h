@@ -59,6 +59,8 @@ const char *fcsl_mcap_error(const fcsl_mcap_t *mcap);
 /* Writes summary and footer, waits until the disk has all of it, and frees the recording in any case.
  * Returns 0, or -1 and fills `error` (may be null). Null is accepted and does nothing. */
 int fcsl_mcap_close(fcsl_mcap_t *mcap, char *error, size_t error_size);
+/* The same without waiting for the disk: the file outlives a killed process, but perhaps not a power failure. */
+int fcsl_mcap_end(fcsl_mcap_t *mcap, char *error, size_t error_size);
 
 /* The CRC-32 of fcsl_crc32 (fcsl_codec.h), at the speed of memory where the processor helps: for whole files. */
 uint32_t fcsl_mcap_crc32(const void *data, size_t size);

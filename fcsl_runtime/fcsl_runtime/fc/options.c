@@ -79,6 +79,9 @@ static const char USAGE[] =
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
+    "  --record-split SPLIT    begin another file after, and keep, some of "
+    "seconds=60,megabytes=100,files=10,around=30\n"
+    "                          (docs/guide/recording.md)\n"
     "  --record-policy P       when the disk is too slow: wait makes the tick wait, drop leaves records out and counts "
     "them\n"
     "                          (default: drop in real time, else wait)\n"
@@ -221,6 +224,7 @@ static const entry_t ENTRIES[] = {
     {.name = "ros", .kind = TEXT, .offset = TO(ros)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
+    {.name = "record-split", .kind = TEXT, .offset = TO(record_split)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
     {.name = "namespace", .kind = TEXT, .offset = TO(name_space)},
     {.name = "summary", .kind = TEXT, .offset = TO(summary_file)},
@@ -303,8 +307,9 @@ static int check(const options_t *options)
     if (options->restore != NULL && has_simulator(options)) {
         return usage_error("--restore goes without a simulator: that begins at tick 0", "");
     }
-    if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
-        return usage_error("--record-fields and --record-policy need --record", "");
+    if ((options->record_fields != NULL || options->record_split != NULL || options->record_policy != RECORD_BY_PACE) &&
+        options->record == NULL) {
+        return usage_error("--record-fields, --record-split and --record-policy need --record", "");
     }
     if (options->telemetry_fields != NULL && options->telemetry == NULL) {
         return usage_error("--telemetry-fields needs --telemetry", "");

@@ -33,6 +33,7 @@ typedef struct {
     const char *ros; /* tcp:HOST:PORT to listen on for a bridge to ROS 2; null: none */
     const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
+    const char *record_split; /* null: one file */
     record_policy_t record_policy;
     const char *name_space;
     const char *summary_file; /* null: not written */

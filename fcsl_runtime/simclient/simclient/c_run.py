@@ -22,7 +22,13 @@ class CError(Structure):
 class CRecordOptions(Structure):
     """fcsl_record_options_t"""
 
-    _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int), ("fields", c_char_p)]
+    _fields_ = [
+        ("bag", c_char_p),
+        ("name_space", c_char_p),
+        ("lossless", c_int),
+        ("fields", c_char_p),
+        ("split", c_char_p),
+    ]
 
 
 class CMessage(Structure):

@@ -395,13 +395,14 @@ class Run:
         """The same with an array of CSeries, which goes on where the last call left it."""
         self._check(self._lib.fcsl_run_feed_series(self.handle(), series, len(series), end, byref(self._error)))
 
-    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
+    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None, split: str = "") -> None:
         """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping
         records.
 
-        `fields`: globs of field paths, separated by commas (None: inputs and outputs)."""
+        `fields`: globs of field paths, separated by commas (None: inputs and outputs). `split`: how the bag is split into
+        files (docs/guide/recording.md)."""
         chosen = None if fields is None else fields.encode()
-        options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless), chosen)
+        options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless), chosen, split.encode())
         self._check(self._lib.fcsl_run_record(self.handle(), byref(options), byref(self._error)))
         not_for_children(self)
 

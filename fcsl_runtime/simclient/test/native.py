@@ -41,13 +41,14 @@ class _Options(ctypes.Structure):
         ("name_space", ctypes.c_char_p),
         ("lossless", ctypes.c_int),
         ("fields", ctypes.c_char_p),
+        ("split", ctypes.c_char_p),
     ]
 
 
 class Drops(ctypes.Structure):
     """fcsl_record_drops_t"""
 
-    _fields_ = [("ring_full", ctypes.c_uint64), ("disk_failed", ctypes.c_uint64)]
+    _fields_ = [(name, ctypes.c_uint64) for name in ("ring_full", "disk_failed", "keyframes")]
 
 
 def _load() -> ctypes.CDLL:
@@ -111,9 +112,11 @@ class Run:
     def step(self, ticks: int) -> None:
         self.call("fcsl_run_step", ticks)
 
-    def record(self, bag: Path, name_space: str = "", lossless: bool = True, fields: str | None = None) -> None:
+    def record(
+        self, bag: Path, name_space: str = "", lossless: bool = True, fields: str | None = None, split: str = ""
+    ) -> None:
         chosen = None if fields is None else fields.encode()
-        options = _Options(str(bag).encode(), name_space.encode(), int(lossless), chosen)
+        options = _Options(str(bag).encode(), name_space.encode(), int(lossless), chosen, split.encode())
         self.call("fcsl_run_record", ctypes.byref(options))
 
     def save_file(self, path: Path) -> None:

@@ -34,6 +34,7 @@ ACCEPTED: list[tuple[str, str, Any, list[str]]] = [
     ("flight", "lock_memory", False, []),
     ("flight", "realtime_priority", 99, ["--realtime-priority=99"]),
     ("flight", "record_policy", "wait", ["--record-policy=wait"]),
+    ("flight", "record_split", "seconds=60,files=10", ["--record-split=seconds=60,files=10"]),
 ]
 REFUSED: list[tuple[str, str, Any, str]] = [
     ("simulation", "seed", -1, "an integer from 0 to 18446744073709551615"),

@@ -50,8 +50,9 @@ fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim);
 
 /* ---- controller in this process ---------------------------------------------------------------------------------- */
 
-/* Records controller and plant truth into a bag, from the next tick on. Topics of the plant: /<ns>/sim/<instance>. */
-int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error);
+/* Records controller and plant truth into a bag, from the next tick on. Topics of the plant: /<ns>/sim/<instance>.
+ * `split`: as of fcsl_record_options_t. */
+int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, const char *split, fcsl_error_t *error);
 int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* Runs up to `ticks` ticks. Returns early when the simulation is over, after a tick in which the machine's state changed,

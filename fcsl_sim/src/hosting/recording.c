@@ -31,24 +31,24 @@ static int add_model_topic(fcsl_sim_t *sim, const char *name, fcsl_model_message
 }
 
 /* A companion has a bag of its own beside that of the first controller: BAG_NAME. */
-static int record_companion(const fcsl_companion_t *companion, const char *bag, const char *name_space,
-                            fcsl_error_t *error)
+static int record_companion(const fcsl_companion_t *companion, const fcsl_record_options_t *first, fcsl_error_t *error)
 {
     char path[4096];
-    const int bytes = snprintf(path, sizeof path, "%s_%s", bag, companion->name);
+    const int bytes = snprintf(path, sizeof path, "%s_%s", first->bag, companion->name);
     if (bytes < 0 || (size_t)bytes >= sizeof path) {
-        return fcsl_fail(error, "the name of a bag is too long: %s_%s", bag, companion->name);
+        return fcsl_fail(error, "the name of a bag is too long: %s_%s", first->bag, companion->name);
     }
-    const fcsl_record_options_t options = {.bag = path, .name_space = name_space, .lossless = 1};
+    fcsl_record_options_t options = *first;
+    options.bag = path;
     return fcsl_run_record(companion->run, &options, error);
 }
 
-int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error)
+int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, const char *split, fcsl_error_t *error)
 {
     if (sim->sensed || sim->external) {
         return fcsl_fail(error, "recording must begin between two ticks, with the controller in this process");
     }
-    const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
+    const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1, .split = split};
     if (fcsl_run_record(sim->run, &options, error)) {
         return -1;
     }
@@ -65,7 +65,7 @@ int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fc
     }
     sim->recording = 1;
     for (uint32_t i = 0; i < sim->companion_count; i++) {
-        if (record_companion(&sim->companions[i], bag, name_space, error)) {
+        if (record_companion(&sim->companions[i], &options, error)) {
             (void)fcsl_sim_record_stop(sim, NULL);
             return -1;
         }

@@ -81,10 +81,10 @@ impl Mcap {
         })
     }
 
-    fn close(self) -> Result<(), Reason> {
+    fn close(self, durable: bool) -> Result<(), Reason> {
         match self.failed {
             Some(reason) => Err(reason),
-            None => self.writer.finish().map_err(|e| reason_of(&e)),
+            None => self.writer.finish(durable).map_err(|e| reason_of(&e)),
         }
     }
 }
@@ -253,11 +253,26 @@ pub unsafe extern "C" fn fcsl_mcap_error(mcap: *const Mcap) -> *const c_char {
 /// As fcsl_mcap_writer.h; `mcap` is not used afterwards.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_close(mcap: *mut Mcap, error: *mut c_char, error_size: usize) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { close(mcap, true, error, error_size) }
+}
+
+/// # Safety
+/// As fcsl_mcap_writer.h; `mcap` is not used afterwards.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_mcap_end(mcap: *mut Mcap, error: *mut c_char, error_size: usize) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { close(mcap, false, error, error_size) }
+}
+
+/// # Safety
+/// As fcsl_mcap_writer.h.
+unsafe fn close(mcap: *mut Mcap, durable: bool, error: *mut c_char, error_size: usize) -> i32 {
     if mcap.is_null() {
         return 0;
     }
     // SAFETY: not null, came from Box::into_raw in fcsl_mcap_open, and ownership ends here.
-    match unsafe { Box::from_raw(mcap) }.close() {
+    match unsafe { Box::from_raw(mcap) }.close(durable) {
         Ok(()) => 0,
         Err(reason) => {
             // SAFETY: the header's contract.

@@ -141,8 +141,8 @@ impl Writer {
         file.put(chunk)
     }
 
-    /// Writes the summary and waits until the disk has all of it.
-    pub fn finish(mut self) -> io::Result<()> {
+    /// Writes the summary; `durable`: waits until the disk has all of it.
+    pub fn finish(mut self, durable: bool) -> io::Result<()> {
         self.flush()?;
         self.file()?;
         let mut file = self.file.take().ok_or_else(lost)?;
@@ -151,7 +151,11 @@ impl Writer {
         self.put_summary(&mut file);
         file.put_staging();
         file.file.flush()?;
-        file.file.into_complete()?.sync_all()
+        let complete = file.file.into_complete()?;
+        if durable {
+            complete.sync_all()?;
+        }
+        Ok(())
     }
 
     /// The file, once the packer is done with the chunk that it has.

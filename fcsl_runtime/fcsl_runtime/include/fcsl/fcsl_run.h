@@ -193,7 +193,8 @@ typedef enum {
     FCSL_WRITE_HEALTH = 8, /* path: an instance; element: the health; fcsl_run_inject_health */
     /* path: as that of FCSL_WRITE_IMPURE; data: the events of that execute: for each the number of its site within the
      * instance, and its values, u64 each */
-    FCSL_WRITE_EVENTS = 9
+    FCSL_WRITE_EVENTS = 9,
+    FCSL_WRITE_LOST = 10 /* element: how many host writes from this tick on are not in the record, for want of room */
 } fcsl_write_kind_t;
 
 /* ---- checkpoints ------------------------------------------------------------------------------------------------ */
@@ -362,7 +363,7 @@ int fcsl_run_set_views(fcsl_run_t *run, const char *views, fcsl_error_t *error);
 /* ---- recording -------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    const char *bag; /* directory to create: metadata.yaml and one .mcap, Jazzy's own layout */
+    const char *bag; /* directory to create: metadata.yaml and .mcap files, Jazzy's own layout */
     const char *name_space; /* ROS namespace: topics are /<ns>/<machine>/<instance>; "" for none */
     int lossless; /* non-zero: a full ring makes step wait for the writer (simulated time);
                                 zero: the record is dropped and counted (real time) */
@@ -370,6 +371,9 @@ typedef struct {
      * text, `?` for one character. Null: FCSL_RECORD_FIELDS. What reproduces the run, and state, transitions, health and
      * counters are always recorded. */
     const char *fields;
+    /* How the bag is split into files and which of them stay, as some of "seconds=60,megabytes=100,files=10,around=30"
+     * (docs/guide/recording.md). Null or "": one file. */
+    const char *split;
 } fcsl_record_options_t;
 
 #define FCSL_RECORD_FIELDS "*.inputs.*,*.outputs.*"
@@ -379,6 +383,9 @@ typedef struct {
 typedef struct {
     uint64_t ring_full; /* the writer was behind; never when lossless */
     uint64_t disk_failed; /* they came after writing had failed */
+    /* Checkpoints in the middle of the recording for which the ring had no room: a replay begins at another one. They are no
+     * records: nothing that happened is missing. */
+    uint64_t keyframes;
 } fcsl_record_drops_t;
 
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
@@ -394,7 +401,7 @@ void fcsl_run_record_lossless(fcsl_run_t *run, int lossless);
 int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error);
 /* All 0 when nothing is being recorded. */
 fcsl_record_drops_t fcsl_run_record_drops(const fcsl_run_t *run);
-/* Their sum. */
+/* Records alone: ring_full and disk_failed. */
 uint64_t fcsl_run_record_dropped(const fcsl_run_t *run);
 
 /* More topics in the same bag (plant truth of a simulator). `schema` is the complete ros2msg text.

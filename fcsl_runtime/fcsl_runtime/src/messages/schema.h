@@ -24,7 +24,7 @@
     "uint8[] data\n" FCSL_SCHEMA_HEADER
 #define FCSL_SCHEMA_HOST_WRITE                                                                                         \
     "uint8 SET=0\nuint8 SET_STATE=1\nuint8 RESTORE=2\nuint8 CHANNEL=3\nuint8 OVERRUN=4\nuint8 ATTACH=5\n"              \
-    "uint8 IMPURE=6\nuint8 FAULT=7\nuint8 HEALTH=8\nuint8 EVENTS=9\n"                                                  \
+    "uint8 IMPURE=6\nuint8 FAULT=7\nuint8 HEALTH=8\nuint8 EVENTS=9\nuint8 LOST=10\n"                                   \
     "std_msgs/Header header\nuint64 tick\nuint8 kind\nstring path\nuint32 element\nuint32 age_ticks\n"                 \
     "int64 stamp_ns\nuint8[] data\n" FCSL_SCHEMA_HEADER
 #define FCSL_SCHEMA_EVENT                                                                                              \

@@ -35,25 +35,74 @@ static void put_topic(FILE *out, const fcsl_metadata_topic_t *topic)
                   topic->message_count);
 }
 
+int fcsl_metadata_file_name(const fcsl_metadata_t *metadata, const fcsl_metadata_file_t *file,
+                            char name[FCSL_FILE_NAME_BYTES])
+{
+    const int length = snprintf(name, FCSL_FILE_NAME_BYTES, "%.480s_%" PRIu32 ".mcap", metadata->stem, file->number);
+    return length > 0 && length < FCSL_FILE_NAME_BYTES ? 0 : -1;
+}
+
+static void put_start(FILE *out, const char *indent, uint64_t first_ns)
+{
+    (void)fprintf(out, "%sstarting_time:\n%s  nanoseconds_since_epoch: %" PRId64 "\n", indent, indent,
+                  (int64_t)first_ns);
+}
+
+static void put_duration(FILE *out, const char *indent, uint64_t first_ns, uint64_t last_ns)
+{
+    (void)fprintf(out, "%sduration:\n%s  nanoseconds: %" PRId64 "\n", indent, indent, (int64_t)(last_ns - first_ns));
+}
+
+/* Of all files. One without messages is as long as its begin. */
+static void put_whole(FILE *out, const fcsl_metadata_t *metadata)
+{
+    uint64_t first_ns = metadata->files[0].first_ns;
+    uint64_t last_ns = metadata->files[0].last_ns;
+    uint64_t count = 0;
+    for (uint32_t i = 0; i < metadata->file_count; i++) {
+        const fcsl_metadata_file_t *file = &metadata->files[i];
+        count += file->message_count;
+        first_ns = file->first_ns < first_ns ? file->first_ns : first_ns;
+        last_ns = file->last_ns > last_ns ? file->last_ns : last_ns;
+    }
+    put_duration(out, "  ", first_ns, last_ns);
+    put_start(out, "  ", first_ns);
+    (void)fprintf(out, "  message_count: %" PRIu64 "\n", count);
+}
+
+static void put_files(FILE *out, const fcsl_metadata_t *metadata)
+{
+    char name[FCSL_FILE_NAME_BYTES] = "";
+    (void)fprintf(out, "  relative_file_paths:\n");
+    for (uint32_t i = 0; i < metadata->file_count; i++) {
+        (void)fcsl_metadata_file_name(metadata, &metadata->files[i], name);
+        (void)fprintf(out, "    - ");
+        put_quoted(out, name);
+        (void)fputc('\n', out);
+    }
+    (void)fprintf(out, "  files:\n");
+    for (uint32_t i = 0; i < metadata->file_count; i++) {
+        const fcsl_metadata_file_t *file = &metadata->files[i];
+        (void)fcsl_metadata_file_name(metadata, file, name);
+        (void)fprintf(out, "    - path: ");
+        put_quoted(out, name);
+        (void)fputc('\n', out);
+        put_start(out, "      ", file->first_ns);
+        put_duration(out, "      ", file->first_ns, file->last_ns);
+        (void)fprintf(out, "      message_count: %" PRIu64 "\n", file->message_count);
+    }
+}
+
 static void put_metadata(FILE *out, const fcsl_metadata_t *metadata)
 {
-    const int64_t start = (int64_t)metadata->first_ns;
-    const int64_t duration = (int64_t)(metadata->last_ns - metadata->first_ns);
     (void)fprintf(out, "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n");
-    (void)fprintf(out, "  duration:\n    nanoseconds: %" PRId64 "\n", duration);
-    (void)fprintf(out, "  starting_time:\n    nanoseconds_since_epoch: %" PRId64 "\n", start);
-    (void)fprintf(out, "  message_count: %" PRIu64 "\n  topics_with_message_count:%s", metadata->message_count,
-                  metadata->topic_count == 0 ? " []\n" : "\n");
+    put_whole(out, metadata);
+    (void)fprintf(out, "  topics_with_message_count:%s", metadata->topic_count == 0 ? " []\n" : "\n");
     for (uint32_t i = 0; i < metadata->topic_count; i++) {
         put_topic(out, &metadata->topics[i]);
     }
-    (void)fprintf(out, "  compression_format: ''\n  compression_mode: ''\n  relative_file_paths:\n    - ");
-    put_quoted(out, metadata->file);
-    (void)fprintf(out, "\n  files:\n    - path: ");
-    put_quoted(out, metadata->file);
-    (void)fprintf(out, "\n      starting_time:\n        nanoseconds_since_epoch: %" PRId64 "\n", start);
-    (void)fprintf(out, "      duration:\n        nanoseconds: %" PRId64 "\n      message_count: %" PRIu64 "\n",
-                  duration, metadata->message_count);
+    (void)fprintf(out, "  compression_format: ''\n  compression_mode: ''\n");
+    put_files(out, metadata);
     (void)fprintf(out, "  custom_data: ~\n  ros_distro: jazzy\n");
 }
 

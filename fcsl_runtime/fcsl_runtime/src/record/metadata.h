@@ -14,14 +14,30 @@ typedef struct {
     uint64_t message_count;
 } fcsl_metadata_topic_t;
 
+/* One MCAP file inside the folder: STEM_NUMBER.mcap. */
 typedef struct {
-    const char *file; /* name of the MCAP file inside the folder */
+    uint32_t number;
     uint64_t first_ns;
-    uint64_t last_ns; /* without messages: both the time at which the recording begins */
+    uint64_t last_ns; /* without messages: both the time at which the file begins */
     uint64_t message_count;
+    uint64_t *topic_counts; /* of a file that is finished: messages of each topic */
+    uint32_t topic_count;
+    int is_kept; /* it has something around a trigger */
+} fcsl_metadata_file_t;
+
+enum { FCSL_FILE_NAME_BYTES = 512 };
+
+typedef struct {
+    char stem[FCSL_FILE_NAME_BYTES];
+    fcsl_metadata_file_t *files; /* in order of time, one at least */
+    uint32_t file_count;
     const fcsl_metadata_topic_t *topics;
     uint32_t topic_count;
 } fcsl_metadata_t;
+
+/* The name of a file inside the folder; -1: too long. */
+int fcsl_metadata_file_name(const fcsl_metadata_t *metadata, const fcsl_metadata_file_t *file,
+                            char name[FCSL_FILE_NAME_BYTES]);
 
 /* Replaces <folder>/metadata.yaml, atomically, by what `ros2 bag` of Jazzy would write (version 9). `durable`: waits until
  * the disk has it; otherwise it outlives a killed process, but perhaps not a power failure. */

@@ -19,7 +19,13 @@
 #include "messages/schema.h"
 #include "recorder_internal.h"
 
-enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
+enum {
+    TOPIC_BYTES = 1024,
+    SCHEMA_BYTES_MAX = 1 << 20,
+    RING_BYTES_MIN = 8 << 20,
+    SCRATCH_BASE_BYTES = 4096,
+    VIEWS_HEAD_BYTES = 64
+};
 
 static int is_namespace(const char *text)
 {
@@ -142,13 +148,16 @@ static int allocate(fcsl_recorder_t *recorder, const char *views, fcsl_error_t *
     const uint32_t count = recorder->machine->instance_count;
     recorder->scratch_size = scratch_bytes(recorder, views);
     recorder->scratch = malloc(recorder->scratch_size);
+    recorder->verdicts_seen =
+        calloc(1, recorder->verdicts.monitor != NULL ? fcsl_verdict_rows_bytes(&recorder->verdicts) : 1u);
     recorder->data = calloc(1, fcsl_run_data_bytes(recorder->machine));
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
     recorder->faults = calloc(count + 1u, sizeof *recorder->faults);
     recorder->overruns = calloc(count + 1u, sizeof *recorder->overruns);
     recorder->fault_places = calloc(count + 1u, sizeof *recorder->fault_places);
-    if (recorder->scratch == NULL || recorder->data == NULL || recorder->health == NULL || recorder->faults == NULL ||
-        recorder->overruns == NULL || recorder->fault_places == NULL) {
+    if (recorder->scratch == NULL || recorder->verdicts_seen == NULL || recorder->data == NULL ||
+        recorder->health == NULL || recorder->faults == NULL || recorder->overruns == NULL ||
+        recorder->fault_places == NULL) {
         return fcsl_fail(error, "out of memory for the recorder");
     }
     return 0;
@@ -159,6 +168,8 @@ static void free_recorder(fcsl_recorder_t *recorder)
     fcsl_record_topics_free(recorder->shown, recorder->shown_count);
     free(recorder->ranges);
     free(recorder->scratch);
+    free(recorder->views);
+    free(recorder->verdicts_seen);
     free(recorder->data);
     free(recorder->health);
     free(recorder->faults);
@@ -187,18 +198,24 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
     return 0;
 }
 
-/* The one message of its topic, written before the writer thread begins; none where there is nothing to say. */
+/* The one message of its topic in each file, here before the writer thread begins; none where there is nothing to say. */
 static int put_views(fcsl_recorder_t *recorder, const char *views, uint64_t time_ns, fcsl_error_t *error)
 {
     if (views[0] == '\0') {
         return 0;
     }
+    const size_t capacity = strlen(views) + VIEWS_HEAD_BYTES;
+    recorder->views = malloc(capacity);
+    if (recorder->views == NULL) {
+        return fcsl_fail(error, "out of memory for the recorder");
+    }
     fcsl_cdr_t cdr;
-    fcsl_cdr_begin(&cdr, recorder->scratch, recorder->scratch_size);
+    fcsl_cdr_begin(&cdr, recorder->views, capacity);
     fcsl_cdr_string(&cdr, views);
+    recorder->views_size = (uint32_t)fcsl_cdr_end(&cdr);
     fcsl_bag_lock(recorder->bag);
-    const int status = fcsl_bag_write(recorder->bag, FCSL_TOPIC_VIEWS, time_ns, recorder->scratch,
-                                      (uint32_t)fcsl_cdr_end(&cdr), error);
+    const int status =
+        fcsl_bag_write(recorder->bag, FCSL_TOPIC_VIEWS, time_ns, recorder->views, recorder->views_size, error);
     fcsl_bag_unlock(recorder->bag);
     return status;
 }
@@ -242,13 +259,16 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl
     recorder->verdicts = start->verdicts;
     recorder->remembered = start->remembered;
     fcsl_recorder_set_lossless(recorder, options->lossless);
-    if (fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
+    if (fcsl_recorder_read_split(recorder, options->split != NULL ? options->split : "", error) != 0 ||
+        fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
         fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, start->views, error) != 0 ||
         prepare(recorder, start, options, name_space, error) != 0) {
         free_recorder(recorder);
         return NULL;
     }
-    fcsl_recorder_checkpoint(recorder, start->first);
+    fcsl_recorder_choose_keyframes(recorder);
+    (void)fcsl_recorder_checkpoint(recorder, start->first,
+                                   recorder->write_policy); /* the ring is empty: there is room */
     return recorder;
 }
 
@@ -284,6 +304,7 @@ fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder)
     return (fcsl_record_drops_t){
         .ring_full = atomic_load_explicit(&recorder->ring_full, memory_order_relaxed),
         .disk_failed = atomic_load_explicit(&recorder->disk_failed, memory_order_relaxed),
+        .keyframes = atomic_load_explicit(&recorder->keyframes_dropped, memory_order_relaxed),
     };
 }
 

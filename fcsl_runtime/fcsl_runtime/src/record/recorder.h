@@ -43,6 +43,9 @@ void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const f
 int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
+/* What follows those: a keyframe, where one is due. It is a checkpoint from which a replay can begin: recorder_keyframe.c.
+ * `next`: the tick that comes now. */
+void fcsl_recorder_end_tick(fcsl_recorder_t *recorder, fcsl_stamp_t next);
 /* The verdicts after the tick just completed: fcsl_verdict_rows_bytes. 0, or -1: there was no room. */
 int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *rows);
 

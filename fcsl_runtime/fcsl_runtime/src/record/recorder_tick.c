@@ -14,7 +14,7 @@ enum { BLOCK_BYTES = FCSL_RING_ALIGNMENT };
 /* Room for one record, or null when there is none, which is counted. */
 static uint8_t *claim(fcsl_recorder_t *recorder, const fcsl_record_t *record, fcsl_ring_policy_t policy)
 {
-    uint8_t *out = fcsl_ring_claim(&recorder->ring, record, policy);
+    uint8_t *out = fcsl_recorder_claim(recorder, record, policy);
     if (out == NULL) {
         const uint64_t count = atomic_load_explicit(&recorder->ring_full, memory_order_relaxed);
         atomic_store_explicit(&recorder->ring_full, count + 1u, memory_order_relaxed);
@@ -87,20 +87,6 @@ void fcsl_recorder_events(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const f
     }
 }
 
-void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
-{
-    const uint32_t size = recorder->machine->size;
-    const uint32_t remembered = recorder->verdicts.monitor != NULL ? recorder->verdicts.monitor->machine->size : 0u;
-    uint8_t *out = claim_tick(recorder, FCSL_RECORD_CHECKPOINT, stamp, size + remembered, recorder->write_policy);
-    if (out != NULL) {
-        memcpy(out, recorder->live, size);
-        if (remembered > 0) {
-            memcpy(out + size, recorder->remembered, remembered);
-        }
-        fcsl_ring_publish(&recorder->ring);
-    }
-}
-
 void fcsl_recorder_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_write_t *write)
 {
     const uint32_t size = (uint32_t)sizeof *write + write->size;
@@ -111,6 +97,9 @@ void fcsl_recorder_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fc
             memcpy(out + sizeof *write, write->data, write->size);
         }
         fcsl_ring_publish(&recorder->ring);
+    } else {
+        recorder->first_lost = recorder->lost_writes == 0 ? stamp : recorder->first_lost;
+        recorder->lost_writes += recorder->lost_writes < UINT32_MAX;
     }
 }
 

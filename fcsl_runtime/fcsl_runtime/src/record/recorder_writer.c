@@ -32,6 +32,9 @@ static int put_scratch(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t s
 
 static int put_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
+    if (fcsl_recorder_split(recorder, stamp) != 0) {
+        return -1;
+    }
     return put_scratch(recorder, FCSL_TOPIC_CHECKPOINT, stamp,
                        fcsl_checkpoint_message(recorder->machine, data, recorder->verdicts.monitor,
                                                data + recorder->machine->size, stamp, recorder->scratch,
@@ -57,14 +60,37 @@ static int put_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8
     fcsl_cdr_string(&cdr, states[1]->name);
     fcsl_cdr_string(&cdr, "");
     fcsl_cdr_string(&cdr, "");
+    fcsl_recorder_trigger(recorder, stamp.time_ns);
     return put_scratch(recorder, FCSL_TOPIC_TRANSITIONS, stamp, fcsl_cdr_end(&cdr));
+}
+
+static int note_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
+{
+    return put_scratch(recorder, recorder->own_topics - 1u, stamp,
+                       fcsl_verdict_message(&recorder->verdicts, recorder->machine, recorder->verdicts_seen, stamp,
+                                            recorder->scratch, recorder->scratch_size));
+}
+
+static uint64_t count_violations(const fcsl_verdict_table_t *table, const uint8_t *rows)
+{
+    uint64_t count = 0;
+    for (uint32_t i = 0; i < table->monitor->requirement_count; i++) {
+        fcsl_verdict_row_t row;
+        memcpy(&row, rows + i * sizeof row, sizeof row);
+        count += row.violations;
+    }
+    return count;
 }
 
 static int put_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
-    return put_scratch(recorder, recorder->own_topics - 1u, stamp,
-                       fcsl_verdict_message(&recorder->verdicts, recorder->machine, data, stamp, recorder->scratch,
-                                            recorder->scratch_size));
+    const fcsl_verdict_table_t *table = &recorder->verdicts;
+    if (recorder->has_verdicts && count_violations(table, data) > count_violations(table, recorder->verdicts_seen)) {
+        fcsl_recorder_trigger(recorder, stamp.time_ns);
+    }
+    memcpy(recorder->verdicts_seen, data, fcsl_verdict_rows_bytes(table));
+    recorder->has_verdicts = 1;
+    return note_verdicts(recorder, stamp);
 }
 
 static int put_events(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data, uint32_t size)
@@ -89,6 +115,9 @@ static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t w
         return fcsl_fail(&recorder->failure, "the machine struct is damaged: tick %" PRIu64 " is of no state",
                          stamp.tick);
     }
+    if (size > 0 && what == FCSL_TICK_TRANSITION) {
+        fcsl_recorder_trigger(recorder, stamp.time_ns);
+    }
     return size == 0 ? 0 : put(recorder, topic, stamp.time_ns, recorder->scratch, (size_t)size);
 }
 
@@ -108,15 +137,20 @@ static int note_counters(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const fcsl_machine_t *machine = recorder->machine;
     int changed = !recorder->status_written;
+    int has_faulted = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const uint64_t faults = fcsl_read_u64(recorder->data, machine->instances[i].faults_offset);
         const uint64_t overruns = fcsl_read_u64(recorder->data, machine->instances[i].overruns_offset);
         const uint32_t place = fcsl_read_u32(recorder->data, machine->instances[i].fault_place_offset);
         changed = changed || faults != recorder->faults[i] || overruns != recorder->overruns[i] ||
                   place != recorder->fault_places[i];
+        has_faulted = has_faulted || faults > recorder->faults[i];
         recorder->faults[i] = faults;
         recorder->overruns[i] = overruns;
         recorder->fault_places[i] = place;
+    }
+    if (has_faulted && recorder->status_seen) {
+        fcsl_recorder_trigger(recorder, stamp.time_ns);
     }
     return changed ? note(recorder, FCSL_TOPIC_FAULTS, FCSL_TICK_FAULTS, stamp) : 0;
 }
@@ -140,7 +174,12 @@ static int put_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t
         note_counters(recorder, stamp) != 0) {
         return -1;
     }
+    if (!recorder->status_written && recorder->status_seen && recorder->has_verdicts &&
+        note_verdicts(recorder, stamp) != 0) {
+        return -1;
+    }
     recorder->status_written = 1;
+    recorder->status_seen = 1;
     return 0;
 }
 

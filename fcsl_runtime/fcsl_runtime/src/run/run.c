@@ -241,6 +241,7 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
         if (run->times != NULL) {
             fcsl_times_note(run, tick);
         }
+        fcsl_recorder_end_tick(run->recorder, fcsl_run_stamp(run, tick + 1u));
     }
     return 0;
 }

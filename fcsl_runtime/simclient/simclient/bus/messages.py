@@ -69,6 +69,7 @@ uint8 IMPURE=6
 uint8 FAULT=7
 uint8 HEALTH=8
 uint8 EVENTS=9
+uint8 LOST=10
 std_msgs/Header header
 uint64 tick
 uint8 kind

@@ -111,6 +111,7 @@ def _dashed(flag: str) -> str:
 
 
 _NAME, _NAMESPACE, _GLOBS = r"[A-Za-z_]\w*", r"/?[A-Za-z_][\w/]*", r"[\w.*?\[\],-]+"
+_SPLIT = r"[a-z]+=[\d.]+(,[a-z]+=[\d.]+)*"
 _ANY_TICKS = 2**63 - 1
 _COMMON: Mapping[str, Reader] = {
     "paused": _flag,
@@ -164,6 +165,7 @@ KINDS: Mapping[str, Kind] = {
             "no_overrun_check": _flag,
             "record_fields": _text(_GLOBS),
             "record_policy": _word("wait", "drop"),
+            "record_split": _text(_SPLIT),
             "summary": _new_file,
         },
         ends_itself=True,

@@ -236,9 +236,9 @@ class AlgTwin(Twin):
 
     # ---- recording --------------------------------------------------------------------------------------------------
 
-    def record(self, bag: str | Path, name_space: str = "") -> None:
+    def record(self, bag: str | Path, name_space: str = "", split: str = "") -> None:
         with self._lock:
-            self._run.record(Path(bag).absolute(), name_space, lossless=True)
+            self._run.record(Path(bag).absolute(), name_space, lossless=True, split=split)
 
     def stop_recording(self) -> None:
         with self._lock:

@@ -109,11 +109,11 @@ class TwinHost(ABC):
         """Ticks skipped since `resume`, because the computer was too slow for real time."""
 
     @abstractmethod
-    def record(self, bag: str | Path, name_space: str = "") -> None:
+    def record(self, bag: str | Path, name_space: str = "", split: str = "") -> None:
         """Records to the directory `bag` (which must not exist) until `stop_recording` or `close`.
 
         The format is MCAP as ROS 2 Jazzy writes it, with the checkpoint and every write that a replay needs. Topics
-        start with /<name_space>/<machine>/.
+        start with /<name_space>/<machine>/. `split`: how the bag is split into files (docs/guide/recording.md).
         """
 
     @abstractmethod
