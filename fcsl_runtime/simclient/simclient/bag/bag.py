@@ -102,11 +102,20 @@ class RecordedMachine:
         return {self.checkpoint, self.writes, self.state, *self.outputs.values()}
 
 
+@dataclass(frozen=True)
+class Place:
+    """A record of one of a bag's files: the number of the file, and where the record begins."""
+
+    file: int = 0
+    begin: int = 0
+
+
 class Bag:
     """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError for anything else.
 
     `notes` are remarks for the user on how the bag was read. `read_bytes` of the bag's files have been read by the pass
-    over its messages that is under way.
+    over its messages that is under way; it is in the file number `reading`, and could not read `lost` parts before the
+    message that it gave last.
     """
 
     def __init__(self, path: str | Path):
@@ -116,11 +125,12 @@ class Bag:
         self.topics: dict[str, Topic] = {}
         #: By topic, its types and definitions.
         self._kinds: dict[str, dict[tuple[str, str, str], Topic]] = {}
-        self.read_bytes = 0
+        self.read_bytes = self.reading = self.lost = 0
         self._summaries: dict[Path, Any] = {}
         #: What defines channels: the summary, or a pass over the file if it has none.
         self._known: dict[Path, Any] = {}
         self._damage: dict[Path, str] = {}
+        self._chunks: dict[str, list[Place] | None] = {}
         self._stores: dict[str, Typestore] = {}
         self._layouts: dict[str, Layout | None] = {}
         self._open()
@@ -194,6 +204,38 @@ class Bag:
         """In the order of the file; ends where the first of them may be missing."""
         return _one_by_one(self._in_file_order(topics, beyond_damage=False))
 
+    def messages_from(self, topics: Collection[str], place: Place | None) -> Iterator[tuple[str, int, bytes]]:
+        """In the order of the file from a place on, which `chunks_of` gave (None: all of them), those behind damage, too."""
+        if place is None:
+            return _one_by_one(self._in_file_order(topics, beyond_damage=True))
+        return _one_by_one(self._from(place, topics, beyond_damage=True))
+
+    def chunks_of(self, topic: str) -> list[Place] | None:
+        """Where the chunks begin that have messages of a topic, in the order of the files; None if an index is missing."""
+        if topic not in self._chunks:
+            self._chunks[topic] = self._find_chunks(topic)
+        return self._chunks[topic]
+
+    def _find_chunks(self, topic: str) -> list[Place] | None:
+        found = []
+        for number, file in enumerate(self.files):
+            summary = self._summaries.get(file)
+            if summary is None:
+                return None
+            channels = {n for n, channel in summary.channels.items() if channel.topic == topic}
+            for chunk in sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset):
+                if not chunk.message_index_offsets:
+                    return None
+                if channels & chunk.message_index_offsets.keys():
+                    found.append(Place(number, chunk.chunk_start_offset))
+        return found
+
+    def chunk(self, place: Place, topic: str) -> list[bytes]:
+        """The messages of a topic in the chunk at this place."""
+        file = self.files[place.file]
+        batches = Scan(file, self._known.get(file)).chunk(place.begin, {topic})
+        return [batch.data[begin:end] for batch in batches for _, _, begin, end in batch.entries.tolist()]
+
     def batches(self, topics: Collection[str] | None = None, in_order: bool = True) -> Iterator[Block]:
         """Like `messages`, many at a time; some batches are empty.
 
@@ -207,19 +249,25 @@ class Bag:
         return self._in_time_order(topics)
 
     def _in_file_order(self, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
-        self.read_bytes = before = 0
-        for file in self.files:
+        return self._from(Place(), topics, beyond_damage)
+
+    def _from(self, place: Place, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
+        self.read_bytes = self.lost = before = lost = 0
+        for number, file in list(enumerate(self.files))[place.file :]:
+            self.reading, begin = number, place.begin if number == place.file else 0
             scan = Scan(file, self._summaries.get(file))
             announced: dict[int, Topic] = {}
-            for batch in scan.batches(topics):
+            for batch in scan.batches(topics, begin):
                 self.read_bytes = before + scan.position
                 if scan.lost and not beyond_damage:
                     break
+                self.lost = lost + scan.lost
                 self._announce_all(scan, announced)
                 yield batch, announced
-            found = self._judged(scan, beyond_damage)
+            found = "" if begin else self._judged(scan, beyond_damage)
             if found and not beyond_damage:
                 return
+            lost += scan.lost or bool(found)
             before += file.stat().st_size
 
     def _in_time_order(self, topics: Collection[str] | None) -> Iterator[Block]:

@@ -103,15 +103,24 @@ class Scan:
             for number, log_ns, begin, end in entries.tolist():
                 yield number, log_ns, data[begin:end]
 
-    def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
-        """The messages of `topics` (None: all) in the order of the file, many at a time; some batches are empty."""
+    def batches(self, topics: Collection[str] | None, begin: int = 0) -> Iterator[Batch]:
+        """The messages of `topics` (None: all) in the order of the file, many at a time, from the record at `begin` on; some
+        batches are empty.
+        """
         with self.file.open("rb") as stream:
-            walk = Walk(stream)
+            walk = Walk(stream, begin)
             with closing(_read_ahead(self.file, _pieces(stream, walk))) as blocks:
                 for block in blocks:
                     self.position = block.end
                     yield from self._listed(block, topics)
         self._ends(walk)
+
+    def chunk(self, begin: int, topics: Collection[str] | None) -> Iterator[Batch]:
+        """Those of the chunk at `begin` alone."""
+        with self.file.open("rb") as stream:
+            pieces = [next(_pieces(stream, Walk(stream, begin)))]
+        for block in _blocks(self.file, pieces):
+            yield from self._listed(block, topics)
 
     @contextmanager
     def parts_by_time(

@@ -41,18 +41,21 @@ class Gap(NamedTuple):
 
 
 class Walk:
-    """The data section of a file. `ended`: it has its end, which is at `end`; otherwise it breaks off there."""
+    """The data section of a file, or from the record at `begin` on. `ended`: it has its end, which is at `end`; otherwise it
+    breaks off there.
+    """
 
-    def __init__(self, stream: BinaryIO):
+    def __init__(self, stream: BinaryIO, begin: int = 0):
         self._stream = stream
+        self._begin = begin
         self._size = os.fstat(stream.fileno()).st_size
         self.ended = False
         self.end = 0
 
     def __iter__(self) -> Iterator[Record | Gap]:
-        at = 0
+        at = self._begin
         self._stream.seek(0)
-        if self._stream.read(len(MAGIC)) == MAGIC:
+        if at == 0 and self._stream.read(len(MAGIC)) == MAGIC:
             at = len(MAGIC)
         while True:
             record = self._record(at)

@@ -23,6 +23,9 @@ class _Packed(Bag):
     def _in_file_order(self, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
         return _unpacked(super()._in_file_order(topics, beyond_damage))
 
+    def chunks_of(self, topic: str) -> None:
+        """Their places are of use to no pass that unpacks messages."""
+
     def _in_time_order(self, topics: Collection[str] | None) -> Iterator[Block]:
         return _unpacked(super()._in_time_order(topics))
 

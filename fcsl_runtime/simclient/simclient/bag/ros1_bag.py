@@ -56,11 +56,13 @@ class Ros1Bag(Bag):
 
     def _in_file_order(self, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
         self.read_bytes = before = 0
-        for file in self._ros1:
+        for number, file in enumerate(self._ros1):
+            self.reading = number
             reading = self._pass(file, topics)
             for piece in file.pieces:
                 yield from self._blocks(reading, piece)
                 self.read_bytes = before + reading.position
+                self.lost = len(reading.losses.parts)
                 if reading.losses.parts and not beyond_damage:
                     break
             self._judge(reading)

@@ -80,9 +80,11 @@ class SqliteBag(Bag):
         return found
 
     def _in_file_order(self, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
-        self.read_bytes = 0
-        for file in self._databases:
+        self.read_bytes = self.lost = 0
+        for number, file in enumerate(self._databases):
+            self.reading = number
             yield from self._blocks(file, file.chosen(topics))
+            self.lost += bool(file.damage)
             if file.damage and not beyond_damage:
                 return
 
@@ -107,6 +109,7 @@ class SqliteBag(Bag):
                         some.append((number, log_ns, file.pages.data(row) if file.pages else _data(database, row)))
                     except _SQLITE_ERRORS as error:
                         lost, why = lost + 1, str(error)
+                        self.lost += 1
                 batch = batch_of(some)
                 self.read_bytes += len(batch.data)
                 yield batch, file.topics

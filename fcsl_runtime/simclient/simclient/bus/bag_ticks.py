@@ -20,7 +20,7 @@ from .messages import DESCRIPTOR
 
 #: HostWrite.kind
 _CHANNEL, _RESTORE = 3, 2
-_KINDS = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH", "EVENTS")
+_KINDS = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH", "EVENTS", "LOST")
 #: What is no doing of a host's: the clock's verdicts, what instances left, the beginning of sampling.
 _NOT_DONE = ("CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "EVENTS")
 _TICK_AT, _VALUE_AT = 20, 28

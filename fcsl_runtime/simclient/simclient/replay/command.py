@@ -44,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="replay with changed sources and the recorded parameters; lists parameters whose compiled value differs",
     )
+    parser.add_argument(
+        "--from-tick",
+        type=int,
+        metavar="TICK",
+        help="begin at the last checkpoint at or before this tick; not with --map or --board",
+    )
     board_help = "plan of a board: the recorded readings of its devices go through its frontends again"
     parser.add_argument("--board", default="", metavar="PLAN", help=board_help)
     parser.add_argument("--json", action="store_true", help="print the verdict as one JSON object; not with --map")
@@ -116,12 +122,16 @@ def command(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
             parser.error(f"{'-o' if name == 'output' else '--' + name.replace('_', '-')} needs --map")
     if options.map and options.board:
         parser.error("--board needs a flight that FCSL recorded, and --map is for other bags")
+    if options.from_tick is not None and (options.map or options.board):
+        parser.error("--from-tick goes with neither --map nor --board")
     if options.map and options.json:
         parser.error("--json does not go with --map")
     if options.map:
         return _main_foreign(options)
     ignore = options.ignore_source_hash
-    verdict = replay(options.bag, options.config, options.library, options.machine, ignore, options.board)
+    verdict = replay(
+        options.bag, options.config, options.library, options.machine, ignore, options.board, options.from_tick
+    )
     for note in verdict.notes:
         print(f"fcsl replay: {note}", file=sys.stderr)
     if options.json:

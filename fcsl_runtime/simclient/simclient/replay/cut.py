@@ -10,7 +10,7 @@ first checkpoint needs a new one, which is made by replaying the bag up to there
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from ..cli import Progress
 from ..complete_output import check_target
 from ..errors import BagError
 from ..run import Run
-from .reproduce import Replay
+from .seek import seek
 
 _NS = 1_000_000_000
 #: Later than every time, in ns.
@@ -55,26 +55,6 @@ class Cut:
         return "\n".join(lines)
 
 
-class _Head(Bag):
-    """The part of a bag before a tick, for the topics of one machine."""
-
-    def __init__(self, whole: Bag, end_tick: int):
-        self._whole, self._end_tick = whole, end_tick
-        super().__init__(whole.path)
-
-    def _open(self) -> None:
-        self.files, self.topics = self._whole.files, self._whole.topics
-
-    def messages_before_damage(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
-        stamps = Stamps(self._whole)
-        for topic, log_ns, data in self._whole.messages_before_damage(topics):
-            tick = stamps.tick(topic, data)
-            if tick is not None and tick >= self._end_tick:
-                return
-            yield topic, log_ns, data
-        self.truncated = self._whole.truncated  # damage counts only if reading reached it
-
-
 def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: int, run: Run) -> bytes:
     """CDR of the Checkpoint message of `machine` before `tick`, whose stamp is `time_ns`, made by a replay on `run`.
 
@@ -88,9 +68,7 @@ def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: in
     first = bag.decode_own(machine.checkpoint, data, wanted)
     _check_same(bag, machine, first, run)
     progress = Progress(f"replaying up to tick {tick}", tick - first.tick)
-    verdict = Replay(_Head(bag, tick), machine, run).run(progress.at)
-    if not verdict.identical or run.tick != tick:
-        raise BagError(f"{bag.path}: the record up to tick {tick} cannot be replayed:\n{verdict}")
+    seek(bag, machine, run, tick, progress.at)
     stamp = replace(first.header.stamp, sec=time_ns // _NS, nanosec=time_ns % _NS)
     message = replace(
         first,

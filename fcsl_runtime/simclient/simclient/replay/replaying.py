@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..bag import Bag, RecordedMachine, formats
+from ..bag.keyframes import keyframe_before
 from ..cli import Progress
 from ..complete_output import check_target, complete_or_absent
 from ..descriptor import Field
@@ -38,14 +39,18 @@ def open_machine(config: str, library: str, machine: str | None) -> Run:
     return open_run(Path(library).absolute(), machine)
 
 
-def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
-    """The checkpoint at the start of the record. Raises BagError."""
+def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> bytes:
+    """The message of the checkpoint at the start of the record. Raises BagError."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
     if data is None:
         raise BagError(
             f"{bag.path}: the initial checkpoint is missing" + (f" ({bag.truncated})" if bag.truncated else "")
         )
-    return bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
+    return data
+
+
+def _decoded(bag: Bag, recorded: RecordedMachine, checkpoint: bytes) -> Any:
+    return bag.decode_own(recorded.checkpoint, checkpoint, ("machine", "source_hash", "layout_hash", "data"))
 
 
 def _recorded_part(run: Run, recorded: RecordedMachine, layout_hash: str, config: str) -> Run:
@@ -123,19 +128,23 @@ def replay(
     machine: str = "",
     ignore_source_hash: bool = False,
     board: str | Path = "",
+    from_tick: int | None = None,
 ) -> Verdict:
     """Replays an FCSL bag against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
     If a subset machine (`instances=[…]`) made the bag, that subset of `config` runs. `machine` selects one of several
     in the bag. `ignore_source_hash` replays although the machine has changed since; the verdict's notes then list the
     differing parameters. With the plan of a `board` the recorded readings of its devices go through its frontends again;
-    without it the recorded samples of the channels are used.
+    without it the recorded samples of the channels are used. `from_tick` begins at the last checkpoint at or before it.
     """
+    if board and from_tick is not None:
+        raise BagError("a replay with a board begins with the bag: no checkpoint has the memory of its frontends")
     opened = formats.opened(bag)
     recorded = opened.machine(machine, by_bystanders=True)
     if lacks := opened.lacks(recorded):
         raise BagError(f"{opened.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
-    checkpoint = _first_checkpoint(opened, recorded)
+    first = keyframe_before(opened, recorded, from_tick) if from_tick is not None else None
+    checkpoint = _decoded(opened, recorded, first.data if first else _first_checkpoint(opened, recorded))
     whole = open_machine(config, library, recorded.name)
     run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
     try:
@@ -145,8 +154,10 @@ def replay(
             notes.append(f"the bag records a part of `{run.machine.name}`, so only that part ran: {names}")
         counted = opened.topics.get(recorded.writes if recorded.by_bystander else recorded.state)
         expected = counted.count if counted else 0
-        with closing(Replay(opened, recorded, run, board)) as reproduced:
+        with closing(Replay(opened, recorded, run, board, first)) as reproduced:
             verdict = reproduced.run(Progress("replaying", expected).at)
+        if first is not None:
+            notes.append(f"it begins at the checkpoint of tick {first.tick}")
         verdict.notes += notes
         verdict.other_sources = checkpoint.source_hash != run.machine.source_hash
         return verdict

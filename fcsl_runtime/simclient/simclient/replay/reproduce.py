@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a recorded machine again from its record and compares every output of every tick, bit for bit.
 
-A record is the initial checkpoint, every host write at the tick that follows it, and the outputs. The replay restores
-the checkpoint and repeats the writes at the same ticks. Outputs, health, requests and states must then be the same.
+A record is a checkpoint, every host write at the tick that follows it, and the outputs. The replay restores the
+checkpoint and repeats the writes at the same ticks. Outputs, health, requests and states must then be the same, and at
+every further checkpoint the whole machine struct. Where writes are missing, the replay begins anew at the next checkpoint.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bag import Bag, RecordedMachine
+from ..bag.keyframes import Keyframe
 from ..bag.states import StateReader
 from ..board.frontends import Frontends
 from ..board.plan import Plan, read_plan
@@ -19,17 +21,29 @@ from ..c_machine import HEALTH_NAMES
 from ..errors import BagError, TwinError
 from ..run import Run
 from .channels import ChannelComparison
-from .verdict import Divergence, OutputComparison, Verdict
+from .verdict import Divergence, OutputComparison, Verdict, struct_difference
 
 #: HostWrite.kind
-SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH, EVENTS = range(10)
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH, EVENTS, LOST = range(11)
 #: Fields that every bag has; older bags lack ages and stamps of samples.
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage; running it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _READINGS_TYPE = "fcsl_hal/msg/Readings"
 _READINGS_FIELDS = ("tick", "now_ns", "backends", "readings")
-_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH", "EVENTS")
+_KIND_NAMES = (
+    "SET",
+    "SET_STATE",
+    "RESTORE",
+    "CHANNEL",
+    "OVERRUN",
+    "ATTACH",
+    "IMPURE",
+    "FAULT",
+    "HEALTH",
+    "EVENTS",
+    "LOST",
+)
 
 
 def _readings_topic(bag: Bag, recorded: RecordedMachine) -> str:
@@ -47,11 +61,15 @@ class Replay:
     """Applies one recorded machine's messages to a run of it and compares.
 
     With the plan of a `board` its channels get what its frontends make of the recorded readings, not the recorded samples.
-    Call `close` at the end.
+    `first` is the checkpoint at which to begin (default: the first of the bag); not with a board, whose frontends have a
+    memory of their own. Call `close` at the end.
     """
 
-    def __init__(self, bag: Bag, recorded: RecordedMachine, run: Run, board: str | Path = ""):
+    def __init__(
+        self, bag: Bag, recorded: RecordedMachine, run: Run, board: str | Path = "", first: Keyframe | None = None
+    ):
         self._bag = bag
+        self._first = first
         self._topics = recorded
         self._run = run
         self._frontends = Frontends(board, run) if board else None
@@ -75,53 +93,82 @@ class Replay:
         self._states = 0
         self._started = False
         self._restored = False
-        self._same_source = False
+        self._same_source = self._same_layout = False
+        #: Why the run is not known any more, until the next checkpoint; "" while it is.
+        self._gap = ""
+        self._lost = self._file = 0
         self._tick = 0
         self._verdict = Verdict()
 
     def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
-        """Replays until the bag ends, lacks messages, or a value differs. Raises BagError if the record contradicts itself."""
+        """Replays until the bag ends or a value differs. Raises BagError if the record contradicts itself."""
         verdict = self._verdict
         topics = {self._topics.checkpoint, self._topics.writes, self._topics.state, *self._outputs}
         topics |= {self._readings} - {""}
-        for topic, _, data in self._bag.messages_before_damage(topics):
-            if topic == self._topics.checkpoint:
-                self._start(data)
-            elif not self._started and self._topics.by_bystander:
-                continue  # what crossed the bus before
-            elif not self._started:
-                raise BagError(f"{self._bag.path}: `{topic}` comes before the initial checkpoint")
-            elif topic == self._topics.writes:
-                self._write(data)
-            elif topic == self._topics.state:
-                self._compare_state(data)
-            elif topic == self._readings:
-                self._sense(data)
-            else:
-                self._compare_outputs(topic, data)
-                progress(verdict.ticks)
+        for topic, _, data in self._bag.messages_from(topics, self._first.place if self._first else None):
+            if self._bag.lost != self._lost:
+                self._lost, self._gap = self._bag.lost, self._gap or f"the bag is incomplete: {self._bag.truncated}"
+            if self._gap and self._frontends is not None:
+                break
+            self._take(topic, data)
+            progress(verdict.ticks)
             if verdict.divergence is not None:
                 return verdict
         if not self._started:
             raise BagError(f"{self._bag.path}: the initial checkpoint is missing")
+        if self._gap:
+            verdict.missing.append(f"ticks from {self._tick} on were not verified: {self._gap}")
         self._note_missing()
         self._note_impure()
         if self._frontends is not None and self._sensed < verdict.ticks:
             verdict.missing.append(f"`{self._readings}` has {self._sensed} of {verdict.ticks} messages")
         return verdict
 
+    def _take(self, topic: str, data: bytes) -> None:
+        begins_file, self._file = self._bag.reading != self._file, self._bag.reading
+        if topic == self._topics.checkpoint:
+            self._take_checkpoint(data, begins_file)
+        elif self._gap:
+            return
+        elif not self._started and (self._topics.by_bystander or self._first is not None):
+            return  # what crossed the bus before; what is in the same chunk
+        elif not self._started:
+            raise BagError(f"{self._bag.path}: `{topic}` comes before the initial checkpoint")
+        elif topic == self._topics.writes:
+            self._write(data)
+        elif topic == self._topics.state:
+            self._compare_state(data)
+        elif topic == self._readings:
+            self._sense(data)
+        else:
+            self._compare_outputs(topic, data)
+
     def close(self) -> None:
         if self._frontends is not None:
             self._frontends.close()
 
-    def _start(self, data: bytes) -> None:
-        """The first checkpoint starts the replay; later ones serve readers that start in the middle."""
-        if self._started:
+    def _take_checkpoint(self, data: bytes, begins_file: bool) -> None:
+        """The first checkpoint starts the replay; later ones are compared, or go on behind a gap."""
+        if not self._started and self._first is not None and data != self._first.data:
             return
         checkpoint = self._bag.decode_own(self._topics.checkpoint, data, ("tick", "source_hash", "layout_hash", "data"))
+        if not self._started:
+            self._start(checkpoint)
+        elif not self._same_layout or self._topics.by_bystander:
+            return
+        elif not self._gap and begins_file and checkpoint.tick != self._tick:
+            self._resume(checkpoint, "no file of the bag has them")
+        elif self._gap:
+            self._resume(checkpoint, self._gap)
+        else:
+            self._advance(checkpoint.tick, "a checkpoint")
+            self._compare_checkpoint(checkpoint)
+
+    def _start(self, checkpoint: Any) -> None:
         self._same_source = checkpoint.source_hash == self._run.machine.source_hash
-        if checkpoint.layout_hash == self._run.machine.layout_hash:
-            self._run.restore(bytes(checkpoint.data))
+        self._same_layout = checkpoint.layout_hash == self._run.machine.layout_hash
+        if self._same_layout:
+            self._restore(checkpoint)
             self._restored = True
         elif checkpoint.tick != 0:
             raise BagError(
@@ -130,6 +177,35 @@ class Replay:
             )
         self._tick = self._run.tick
         self._started = True
+        if self._gap:
+            self._verdict.missing.append(f"ticks before {self._tick} were not verified: {self._gap}")
+            self._gap = ""
+
+    def _resume(self, checkpoint: Any, why: str) -> None:
+        """Begins anew behind ticks that cannot be run."""
+        ticks = f"ticks {self._tick} to {checkpoint.tick - 1}" if checkpoint.tick > self._tick else "some ticks"
+        self._verdict.missing.append(f"{ticks} were not verified: {why}")
+        self._gap = ""
+        self._restore(checkpoint)
+        self._tick = self._run.tick
+
+    def _restore(self, checkpoint: Any) -> None:
+        try:
+            self._run.restore(bytes(checkpoint.data))
+        except TwinError as error:
+            raise BagError(
+                f"{self._bag.path}: the checkpoint of tick {checkpoint.tick} cannot be used: {error}"
+            ) from None
+        if self._run.tick != checkpoint.tick:
+            raise BagError(
+                f"{self._bag.path}: the checkpoint of tick {checkpoint.tick} has tick {self._run.tick} in it"
+            )
+
+    def _compare_checkpoint(self, checkpoint: Any) -> None:
+        found = struct_difference(bytes(checkpoint.data), self._run.save(), self._run.machine)
+        if found is not None:
+            self._diverged(checkpoint.tick, *found)
+        self._verdict.checkpoints += 1
 
     def _advance(self, tick: int, what: str) -> None:
         """Runs until `tick` ticks are completed."""
@@ -146,6 +222,9 @@ class Replay:
     def _write(self, data: bytes) -> None:
         write = self._bag.decode_own(self._topics.writes, data, _WRITE_FIELDS)
         self._advance(write.tick, f"a write to `{write.path}`")
+        if write.kind == LOST:
+            self._gap = f"{write.element} host writes found no room in the recorder's ring"
+            return
         try:
             self._apply(write, bytes(write.data))
         except (TwinError, KeyError, ValueError) as error:

@@ -3,20 +3,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import functools
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from ..bag import Bag, is_made_for_a_record
+from ..descriptor import Field, Machine
 from ..errors import BagError, TwinError
 from ..ros.cdr import Layout, bits, fixed_layout
 from ..run import Run
-from ..values import scalar_reader
+from ..values import decode, scalar_reader
 
 #: The encapsulation and the stamp of a message, which depends on the host's clock.
 _STAMP_END = 12
+#: source_hash and layout_hash of the monitor, which what requirements remember begins with (docs/guide/recording.md).
+MEMORY_HASHES_BYTES = 128
 _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
 
 
@@ -56,6 +60,8 @@ class Verdict:
     divergence: Divergence | None = None
     missing: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    #: Checkpoints of the bag with which the whole machine struct agreed.
+    checkpoints: int = 0
     other_sources: bool = False
 
     @property
@@ -72,6 +78,40 @@ class Verdict:
         return f"{self.ticks} ticks, identical{' with the recorded parameters' if self.other_sources else ''}"
 
 
+def struct_difference(was: bytes, now: bytes, machine: Machine) -> tuple[str, str, str, str, str] | None:
+    """As OutputComparison.differ, of two machine structs with what requirements remember behind them; that only counts if
+    it is of the same requirements.
+    """
+    own = machine.size
+    if was == now or (
+        was[:own] == now[:own] and was[own : own + MEMORY_HASHES_BYTES] != now[own : own + MEMORY_HASHES_BYTES]
+    ):
+        return None
+    if len(was) < own:
+        return "(the checkpoint)", f"{len(was)} bytes", f"{own} bytes", "", ""
+    at = next((i for i in range(own) if was[i] != now[i]), own)
+    if at == own:
+        return "(the checkpoint: what requirements remember)", f"{len(was) - own} bytes", "other bytes", "", ""
+    found = next((f for f in machine.fields.values() if f.offset <= at < f.offset + f.size), None)
+    if found is None:
+        return f"(the checkpoint: byte {at})", "", "", _hex(was[at]), _hex(now[at])
+    size = found.size // found.count
+    element = (at - found.offset) // size
+    begin = found.offset + element * size
+    old, new = was[begin : begin + size], now[begin : begin + size]
+    one = replace(found, count=1, size=size, shape=())
+    path = found.path + (f"[{element}]" if found.shape else "")
+    words = [_word(data, one, machine) for data in (old, new)]
+    return f"{path} (in the checkpoint)", words[0], words[1], "0x" + old[::-1].hex(), "0x" + new[::-1].hex()
+
+
+def _word(data: bytes, one: Field, machine: Machine) -> str:
+    try:
+        return repr(decode(data, one, (), machine))
+    except (TwinError, ValueError, IndexError):  # a number that no state, request or health has
+        return "no value"
+
+
 class OutputComparison:
     """Compares one instance's recorded messages with those of the replayed run."""
 
@@ -80,9 +120,7 @@ class OutputComparison:
         layout = bag.layout(topic)
         if layout is None or "tick" not in layout.leaves:
             raise BagError(f"{bag.path}: topic `{topic}` is not the output of a machine")
-        store = get_typestore(Stores.ROS2_JAZZY)
-        store.register(get_types_from_msg(described.message_text, described.message_type))
-        now = fixed_layout(store.fielddefs, described.message_type)
+        now = _layout_of(described.message_text, described.message_type)
         if now is None:
             raise TwinError(f"the message of instance `{described.name}` has no fixed layout")
         self.name = described.name
@@ -130,6 +168,13 @@ class OutputComparison:
         if field is None or field.type in _NUMBERS:
             return str(value)
         return repr(scalar_reader(field, self._run.machine)(int(value)))
+
+
+@functools.cache
+def _layout_of(text: str, kind: str) -> Layout | None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg(text, kind))
+    return fixed_layout(store.fielddefs, kind)
 
 
 def _hex(value: Any) -> str:
