@@ -244,6 +244,7 @@ static int open_record(program_t *program)
         .name_space = program->options.name_space,
         .lossless = policy == RECORD_BY_PACE ? !loop->realtime : policy == RECORD_WAIT,
         .fields = program->options.record_fields,
+        .split = program->options.record_split,
     };
     if (fcsl_run_record(loop->run, &record, &error) != 0 ||
         hal_topic_open(&loop->hal_topic, &loop->hal, loop->run, record.name_space, &error) != 0 ||

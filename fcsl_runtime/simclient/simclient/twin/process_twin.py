@@ -292,7 +292,9 @@ class ProcessTwin(Twin):
 
     # ---- recording --------------------------------------------------------------------------------------------------
 
-    def record(self, bag: str | Path, name_space: str = "") -> None:
+    def record(self, bag: str | Path, name_space: str = "", split: str = "") -> None:
+        if split:
+            raise TwinError("the program of a ProcessTwin does not split what its socket records")
         self._do_command("record", Path(bag).absolute(), name_space)
 
     def stop_recording(self) -> None:
