@@ -18,6 +18,7 @@ from .tick import (
     MACHINE,
     NO_INSTANCE,
     ONE,
+    PART,
     TICK,
     TICKS_IN_STATE,
     TickEmitter,
@@ -43,7 +44,7 @@ class StepEmitter:
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
     def emit(self) -> Iterator[Function]:
-        yield self._init()
+        yield from self._init()
         yield self._start()
         if len(self.m.states) > 1:
             yield self._enter()
@@ -63,20 +64,28 @@ class StepEmitter:
         parameters = (("machine", code.UNTYPED), *more)
         return Function(f"fcsl_{entry}_{self.m.name}", parameters, result, (machine, *body))
 
-    def _init(self) -> Function:
+    def _init(self) -> Iterator[Function]:
         m = self.m
         body: list[Statement] = [code.Clear(MACHINE, self.pointer.target), Set(_CURRENT, NO_INSTANCE)]
         body += [Set(place, state_constant(m, m.initial_state)) for place in (_ACTIVE, _NEXT)]
-        for instance, first in zip(m.instances, self.firsts, strict=True):
-            called = Call(init_name(m, instance, m.instances[first]), (code.Address(record_of(instance)),))
-            body.append(Do(called))
+        calls = [
+            Do(Call(init_name(m, instance, m.instances[first]), (code.Address(record_of(instance)),)))
+            for instance, first in zip(m.instances, self.firsts, strict=True)
+        ]
+        if len(calls) > PART:
+            for number, at in enumerate(range(0, len(calls), PART)):
+                name, parameters = f"fcsl_init_{m.name}_{number}", (("m", self.pointer),)
+                yield Function(name, parameters, None, tuple(calls[at : at + PART]), inline="rare")
+                body.append(Do(Call(name, (MACHINE.pointer,))))
+        else:
+            body += calls
         for connection in m.connections:
             if connection.delayed:
                 body += store(m, port_place(m, connection.target), connection.target.type, connection.initial)
         for channel in sensors(m):
             body += [Set(channel_place(channel, member), Literal(1, code.U8)) for member in ("valid", "waiting")]
         # Cold, so that C compilers do not spend time on a copy of init for every instance.
-        return replace(self._of_descriptor("init", (), body), inline="rare")
+        yield replace(self._of_descriptor("init", (), body), inline="rare")
 
     def _start(self) -> Function:
         body = [statement for n, instance in enumerate(self.m.instances) for statement in self._started(n, instance)]

@@ -33,7 +33,7 @@ from .watched import apply_effects, copy_watched
 
 #: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
-_PART = 25
+PART = 25
 
 _HOST = Name("host")
 _NOW = Name("now_ns")
@@ -123,7 +123,7 @@ class TickEmitter:
     def _state(self, state: State) -> Iterator[Function]:
         entries, name = list(enumerate(state.entries)), f"fcsl_tick_{self.m.name}_{state.name}"
         readings, timed = self._readings(state), any(self._is_timed(e) for e in state.entries)
-        parts = [entries[at : at + _PART] for at in range(0, len(entries), _PART)]
+        parts = [entries[at : at + PART] for at in range(0, len(entries), PART)]
         calls: list[Statement] = []
         for number, part in enumerate(parts if len(parts) > 1 else []):
             # Each part gets the last reading of the clock and returns its own.
