@@ -16,7 +16,7 @@ from fcsl_compiler.driver.toolchain import call_graph_flags, compiler
 CMAKE = """cmake_minimum_required(VERSION 3.22)
 project(two_craft C)
 find_package(fcsl_compiler REQUIRED)
-fcsl_add_machine(two_craft_machines fc/first.json fc/second.json)
+fcsl_add_machine(two_craft_machines fc/first.json fc/second.json TIMES)
 add_executable(user user.c)
 target_link_libraries(user PRIVATE two_craft_machines)
 """
@@ -68,6 +68,7 @@ def test_both_machines_are_in_the_library(package: Path) -> None:
     library = package / "build" / "libtwo_craft_machines.so"
     assert Machine(library, "first").names == ["first", "second"]
     run(package / "build" / "user")
+    assert "host->measure(" in (package / "build/two_craft_machines_c/first.c").read_text()  # TIMES
 
 
 def test_rebuild(package: Path) -> None:

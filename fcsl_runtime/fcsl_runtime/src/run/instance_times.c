@@ -69,7 +69,7 @@ static void measure(void *ctx, int32_t instance)
     const fcsl_run_t *run = ctx;
     struct fcsl_times *times = run->times;
     const uint64_t now_ns = fcsl_monotonic_ns();
-    if (instance >= 0 && times->measured_count < times->count) {
+    if (instance >= 0 && (uint32_t)instance < times->count && times->measured_count < times->count) {
         times->measured[times->measured_count++] =
             (measured_t){.instance = (uint32_t)instance, .ns = now_ns - times->read_ns};
     }
