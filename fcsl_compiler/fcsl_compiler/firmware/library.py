@@ -69,7 +69,9 @@ def build_firmware(
     folder is unchanged. Raises DiagnosticError, ToolchainError, UsageError."""
     command = [*processor.command, *MACHINE_FLAGS]
     found = " ".join([toolchain_of(processor.command), *MACHINE_FLAGS])
-    compilations = [compile_machine(path, found, "emit", strict, target, instances=instances, folds=False) for path in configs]
+    compilations = [
+        compile_machine(path, found, "emit", strict, target, instances=instances, folds=False) for path in configs
+    ]
     for c in compilations:
         compile_monitor(c)
         nim = [source.name for source in c.target.sources if source.suffix == ".nim"]

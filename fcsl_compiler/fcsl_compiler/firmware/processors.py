@@ -71,4 +71,3 @@ def _clang(processor: str) -> str:
             "Ubuntu: apt-get install clang-19 lld-19)"
         )
     return found
-
