@@ -20,8 +20,8 @@ static int is_before(const fcsl_queued_event_t *a, const fcsl_queued_event_t *b)
 static fcsl_queued_event_t random_event(uint64_t *random, uint32_t index)
 {
     return (fcsl_queued_event_t){.time_ns = (int64_t)(next_random(random) % 7) - 3,
-                          .priority = (uint32_t)(next_random(random) % 3),
-                          .index = index};
+                                 .priority = (uint32_t)(next_random(random) % 3),
+                                 .index = index};
 }
 
 static void pops_in_order(void)

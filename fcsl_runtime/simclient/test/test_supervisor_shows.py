@@ -296,7 +296,9 @@ def test_times_of_instances(
     found = families(supervisor.get("/metrics").body)
     for name, of in (("runs", lambda row: row["runs"]), ("seconds", lambda row: row["total_ns"] / 1e9)):
         samples = [s for s in found[f"fcsl_run_instance_{name}"].samples if s.labels["run"] == run["id"]]
-        assert {s.labels["instance"]: s.value for s in samples} == {instance: of(row) for instance, row in times.items()}
+        assert {s.labels["instance"]: s.value for s in samples} == {
+            instance: of(row) for instance, row in times.items()
+        }
     supervisor.ask("DELETE", f"/runs/{run['id']}")
     other = supervisor.start("plain.so", paused=True)
     assert supervisor.get(f"/runs/{other['id']}/times").json == {}

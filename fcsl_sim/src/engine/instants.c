@@ -36,9 +36,9 @@ static int schedule_update(fcsl_sim_t *sim, uint32_t index)
 static int schedule_companion(fcsl_sim_t *sim, uint32_t index)
 {
     const fcsl_queued_event_t event = {.time_ns = sim->companions[index].next_tick_ns,
-                                .kind = EVENT_COMPANION,
-                                .index = index,
-                                .priority = PRIORITY_COMPANION};
+                                       .kind = EVENT_COMPANION,
+                                       .index = index,
+                                       .priority = PRIORITY_COMPANION};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
