@@ -234,6 +234,12 @@ TARGETS = (
         Defect(f"{_RUNTIME}/messages/message.c", "if (length >= WORD_BYTES) {", "if (length > WORD_BYTES) {"),
     ),
     Target(
+        "parameters",
+        "parameter files",
+        "files, socket",
+        Defect(f"{_RUNTIME}/parameters/parameters.c", "if (value->count == value->field->count) {", "if (0) {"),
+    ),
+    Target(
         "checkpoint",
         "machine structs of checkpoints, and ticks from there",
         "files, bags, socket",

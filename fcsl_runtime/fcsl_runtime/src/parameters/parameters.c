@@ -271,17 +271,17 @@ static int read_all(reading_t *r, const fcsl_parameters_t *parameters, fcsl_erro
         return -1;
     }
     if (sections == 0) {
-        return fcsl_fail(error,
-                         "%.120s: no `ros__parameters:` in it; a parameter file begins with `/**:`, below it "
-                         "`ros__parameters:`, and below it the parameters",
-                         parameters->name);
+        return yaml_fail(
+            r->file, 0, error,
+            "no `ros__parameters:` in it; a parameter file begins with `/**:`, below it `ros__parameters:`, and below "
+            "it the parameters");
     }
     if (parameters->used != NULL) {
         *parameters->used |= r->is_meant;
     } else if (!r->is_meant && r->other[0] != '\0') {
-        return fcsl_fail(error,
-                         "%.120s: no section is for `%.120s`; the first is for `%.120s`, `/**:` is for every node",
-                         parameters->name, r->node, r->other);
+        return yaml_fail(r->file, 0, error,
+                         "no section is for `%.120s`; the first is for `%.120s`, `/**:` is for every node", r->node,
+                         r->other);
     }
     return 0;
 }

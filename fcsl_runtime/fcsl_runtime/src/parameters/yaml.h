@@ -55,7 +55,7 @@ int64_t yaml_read(const char *text, size_t size, const char *file, yaml_take_t t
 /* The next item of a value. Returns 0, or -1 with `error`. */
 int yaml_next(yaml_cursor_t *cursor, yaml_item_t *item, fcsl_error_t *error);
 
-/* An error of a line; -1. */
+/* An error of a line, or of the file (0); -1. */
 __attribute__((format(printf, 4, 5))) int yaml_fail(const char *file, uint32_t line, fcsl_error_t *error,
                                                     const char *format, ...);
 

@@ -21,8 +21,11 @@ int yaml_fail(const char *file, uint32_t line, fcsl_error_t *error, const char *
             *at = '?'; /* what a hostile file names shall not steer a terminal */
         }
     }
-    return file[0] != '\0' ? fcsl_fail(error, "%.120s:%u: %s", file, (unsigned)line, reason)
-                           : fcsl_fail(error, "%s", reason);
+    if (file[0] == '\0') {
+        return fcsl_fail(error, "%s", reason);
+    }
+    return line > 0u ? fcsl_fail(error, "%.120s:%u: %s", file, (unsigned)line, reason)
+                     : fcsl_fail(error, "%.120s: %s", file, reason);
 }
 
 int yaml_peek(const yaml_cursor_t *cursor)
