@@ -63,7 +63,8 @@ def chain_times(folder: Path, sizes: tuple[int, ...] = SIZES, rounds: int = ROUN
     for links in sizes:
         (plain, seconds), (timed, _) = (build_chain(folder, links, limit) for limit in (0, 1_000_000))
         arguments += [str(links), str(plain), str(timed)]
-        builds.append({"build_s": seconds, "code_bytes": code_bytes(plain.with_name(f"chain{links}.c"))})
+        sizes_of = {"code_bytes": code_bytes(plain.with_name(f"chain{links}.c")), "library_bytes": plain.stat().st_size}
+        builds.append({"build_s": seconds, **sizes_of})
     line = [str(program), str(rounds), *arguments]
     times = json.loads(subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True).stdout)
     return [{**figures, **build} for figures, build in zip(times, builds, strict=True)]
@@ -85,6 +86,7 @@ def chain_rows(facts: list[dict[str, Any]]) -> list[tuple[str, ...]]:
             "clock reads",
             "timed, each besides",
             "code",
+            "library, each",
             "state",
             "build",
         )
@@ -101,6 +103,7 @@ def chain_rows(facts: list[dict[str, Any]]) -> list[tuple[str, ...]]:
                 f"{f['reads_per_step']:g}",
                 _spread(f["besides_ns"], " ns"),
                 f"{f['code_bytes']} B",
+                f"{f['library_bytes'] / n:.0f} B",
                 f"{f['state_bytes']} B",
                 f"{f['build_s']:.1f} s",
             )
