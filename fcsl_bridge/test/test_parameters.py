@@ -15,7 +15,7 @@ from controller_client import ACTIVATE, CLEANUP, CONFIGURE, ControllerClient
 
 from fcsl_bridge.nodes.controller_node import OPTIONS
 from fcsl_msgs.srv import Restore, Save
-from simclient import AlgTwin
+from simclient import AlgTwin, ProcessTwin
 from simclient.bag import Bag
 from simclient.replay import replay
 
@@ -193,6 +193,29 @@ def test_what_get_says_after_a_restore(domain: Domain, library: Path) -> None:
     assert client.call(Restore, "restore", file=file).success
     assert client.get("pilot.limit") == f32(0.1)
     assert client.get("pilot.armed") is True and client.get("pilot.weights") == [0.5, 0.5, 0.5]
+
+
+def test_a_file_that_fcsl_var_saves(domain: Domain, library: Path) -> None:
+    """Tuned on the flight program, flown with by the node."""
+    values = {
+        "gain": 3.0,
+        "limit": f32(0.1),
+        "weights": [1e-9, 0.0, -1.0],
+        "table": [9, 8, 7, 6],
+        "armed": False,
+        "least": "failed",
+        "on_done": "tr_LAND",
+    }
+    file = domain.folder / "tuned.yaml"
+    with ProcessTwin.from_library(library) as twin:
+        shaped = values | {"table": [[9, 8], [7, 6]]}
+        twin.set_many({f"pilot.parameters.{name}": value for name, value in shaped.items()})
+        file.write_text(twin._client.parameters())
+    assert file.read_text().count("\n    pilot.") == len(values)
+    domain.start("controller_node", "--params-file", str(file), machine=library, mode="realtime")
+    client = ControllerClient(domain.listener())
+    assert {name: client.get(f"pilot.{name}") for name in values} == values
+    assert client.get("pilot.steps") == rig.PARAMETERS["steps"]
 
 
 def test_parameters_come_and_go_with_the_configuration(domain: Domain, library: Path) -> None:
