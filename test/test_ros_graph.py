@@ -15,6 +15,7 @@ import subprocess
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -25,6 +26,7 @@ from lander.msg import LanderControlDescent
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
+from std_msgs.msg import String
 from zenoh.ext import AdvancedSubscriber, HistoryConfig, declare_advanced_subscriber
 
 from fcsl_msgs.msg import MachineState
@@ -273,12 +275,13 @@ class Gauge:
 
 class Pump:
     inputs = {"now": "i64"}
-    outputs = {"speed": "f64 m/s", "height": "f64 m", "armed": "bool"}
+    outputs = {"speed": "f64 m/s", "height": "f64 m", "armed": "bool", "mode": "i32"}
 
     def execute(self):
         self.speed = 3.0
         self.height = 4.0
         self.armed = self.now < 2000000000
+        self.mode = 1 if self.armed else 0
 """
 TANK = {
     "tick_hz": HZ,
@@ -299,6 +302,8 @@ TANK = {
         | {
             "ros": {"type": "geometry_msgs/PoseWithCovarianceStamped", "field": "pose.pose.position.z", "topic": "pose"}
         },
+        {"name": "mode", "id": 4, "field": "pump.outputs.mode", "direction": "report"}
+        | {"ros": {"type": "std_msgs/String", "field": "data", "choices": ["off", "pumping"]}},
     ],
 }
 TANK_SIM = {
@@ -324,12 +329,14 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     levels: list[PointStamped] = []
     commands: list[TwistStamped] = []
     poses: list[PoseWithCovarianceStamped] = []
+    modes: list[str] = []
     with started("fcsl-sim", "run", tmp_path / "tank.sim.json", *options) as sim, bridge(endpoint) as session:
         declared = tokens(session)
         subscribers = [
             session.declare_subscriber("r1/level", lambda s: levels.append(read(s, PointStamped))),
             session.declare_subscriber("cmd_vel", lambda s: commands.append(read(s, TwistStamped))),
             session.declare_subscriber("r1/pose", lambda s: poses.append(read(s, PoseWithCovarianceStamped))),
+            session.declare_subscriber("r1/mode", lambda s: modes.append(read(s, String).data)),
         ]
         said, complaint = sim.communicate(timeout=LONG_S)
         for subscriber in subscribers:
@@ -337,7 +344,7 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     assert sim.returncode == 0, complaint
     of_machine = {"state": LATCHED, "health": LATCHED, "faults": LATCHED, "transitions": EVENT}
     wanted = {f"r1/tank/{name}": quality for name, quality in of_machine.items()}
-    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND, "r1/pose": COMMAND}
+    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND, "r1/pose": COMMAND, "r1/mode": COMMAND}
     assert declared == {topic: ("MP", quality) for topic, quality in wanted.items()}
     assert "ROS 2 topics: 400 ticks, 0 dropped" in said
     assert {(m.point.z, m.header.frame_id, tick_of(m) % 2) for m in levels} == {(7.5, "tank", 0)}
@@ -347,3 +354,4 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     assert all(m.twist.linear.x == (3.0 if tick_of(m) < 200 else -1.0) for m in commands)
     assert {(m.pose.pose.position.z, m.pose.covariance[0], m.pose.covariance[7]) for m in poses} == {(4.0, -1.0, 0.0)}
     assert max(tick_of(m) for m in poses) > 200
+    assert [mode for mode, _ in groupby(modes)] == ["pumping", "off"]

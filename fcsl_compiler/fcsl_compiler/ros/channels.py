@@ -75,7 +75,8 @@ def definition_texts(channels: Iterable[Channel]) -> list[str]:
 
 
 def payload_of(channel: Channel) -> Message:
-    """The message of a channel alone, as it lies on the bus: that of its `ros` block, else one of std_msgs.
+    """The message of a channel alone, as it lies on the bus: that of its `ros` block, if it is standard, else one of
+    std_msgs.
 
     A NaN and a quaternion of length zero are values there, as they are without a message.
     """
@@ -83,14 +84,15 @@ def payload_of(channel: Channel) -> Message:
         blob = full_name(BLOB)
         reader = reader_conversion(STANDARD, blob, [])
         return Message((channel,), blob, type_hash(STANDARD, blob), composer_conversion(STANDARD, blob, []), reader)
-    ros = channel.ros if channel.ros.type and not _is_length(channel.ros) else standard_mapping(channel.port.type)
+    ros = channel.ros if _stands_alone(channel.ros) else standard_mapping(channel.port.type)
     message = message_of([replace(channel, ros=ros)])
     return replace(message, reader=replace(message.reader, nan_allowed=True))
 
 
-def _is_length(ros: RosMapping) -> bool:
-    """Whether it is the length of a list, which says nothing without the list."""
-    return select(interfaces_of(ros).members, full_name(ros.type), ros.field).is_length
+def _stands_alone(ros: RosMapping) -> bool:
+    """Whether a receiver that knows the standard messages can read the message of this channel alone."""
+    message = full_name(ros.type)
+    return message in STANDARD and not ros.choices and not select(STANDARD, message, ros.field).is_length
 
 
 def standard_mapping(type_: Type) -> RosMapping:

@@ -29,6 +29,7 @@ class Pick:
     geometry_msgs/Quaternion needs none. `rotation`: 3x3 row by row, from the axes of the sensor into those of its body,
     before the change of axes. `scale`, `offset`: none, one, or one per scalar; applied last. `null_refused`: a
     quaternion of length zero is no value. `choices`: the value is the index of what the message has (rows.Choice).
+    `shorter`: a list may have fewer elements, as with its length among the picks; the others are 0.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Pick:
     offset: tuple[float, ...] = ()
     null_refused: bool = False
     choices: tuple[Choice, ...] = ()
+    shorter: bool = False
 
 
 def has_stamp(definitions: Definitions, message: str) -> bool:
@@ -76,7 +78,7 @@ def reader_conversion(
     }
     limited = _limited(picks, selections)
     walk = Walk(definitions, message, wanted, {path: text for path, text in strings.items() if text}, texts, limited)
-    return _conversion(walk, picks, selections, guards, stamps, limited)
+    return _conversion(walk, picks, selections, guards, stamps)
 
 
 def _limited(picks: Sequence[Pick], selections: Sequence[Selection]) -> frozenset[str]:
@@ -85,7 +87,7 @@ def _limited(picks: Sequence[Pick], selections: Sequence[Selection]) -> frozense
     limited = set()
     for pick, selection in zip(picks, selections, strict=True):
         for piece in selection.pieces:
-            if f"{piece.path}.{LENGTH}" in lengths and piece.element is None:
+            if (pick.shorter or f"{piece.path}.{LENGTH}" in lengths) and piece.element is None:
                 if pick.axes or pick.source_axes or pick.rotation or pick.order or len(selection.pieces) > 1:
                     raise ConversionError(f"`{pick.name}`: a list with a `.{LENGTH}` beside it is taken as it is")
                 limited.add(piece.path)
@@ -98,7 +100,6 @@ def _conversion(
     selections: Sequence[Selection],
     guards: Sequence[Sequence[tuple[Piece, float]]],
     stamps: Sequence[Piece],
-    limited: frozenset[str],
 ) -> ReaderConversion:
     rows, at, align = Rows(), 0, 1
     values: list[Value] = []
@@ -114,7 +115,7 @@ def _conversion(
         rows.add(_matrix(pick, selection), sources, targets, pick.scale, pick.offset)
         row_count = len(rows.rows) - first
         rotation = pick.null_refused and _is_rotation(pick, selection)
-        is_limited = any(piece.path in limited for piece in selection.pieces)
+        is_limited = any(piece.path in walk.limited for piece in selection.pieces)
         numbers = [choice for choice in pick.choices if isinstance(choice, int)]
         first_choice = len(choices) if numbers else NONE
         values.append(

@@ -59,6 +59,7 @@ class Walk:
         self.anchor_count = 0
         self._member_count = 0
         self._definitions, self._message, self._strings = definitions, message, strings
+        self.limited: set[str] = set()  # those of `limited` that are sequences here
         self._choices, self._limited = choices, limited
         self._key = ""  # path of the string that is the key, in a loop that finds an element
         self._wanted: dict[str, list[Piece]] = {}
@@ -170,7 +171,9 @@ class Walk:
                 if name == NONE:
                     raise self._error(path or "", "stands before the names of its elements")
             whole = piece.element is None
-            element = piece.element if isinstance(piece.element, int) else int(whole and path in self._limited)
+            limited = path is not None and whole and path in self._limited
+            self.limited |= {path} if path is not None and limited else set()
+            element = piece.element if isinstance(piece.element, int) else int(limited)
             self.picks.append(SequencePick(anchor, piece.count if whole else 0, element, name))
         length = self._length(path)
         if length != NONE:

@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from fcsl_compiler.cli.main import main
+from simclient.bag import columns
 from simclient.errors import TwinError
 from simclient.machine_build import build_config
+from simclient.replay import replay_foreign
 from simclient.ros.topics import SampleInput, composer_of, topics_of
 from simclient.run import Run, open_run
 
@@ -354,3 +357,23 @@ def test_a_bounded_list_has_no_more(config: Path) -> None:
     (config.parent / "drive.py").write_text(ALGORITHM.replace("i32[3]", "i32[5]"))
     found = errors(config)
     assert "E238" in found and "has at most 4 elements" in found
+
+
+# ---- bags --------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_bag_is_replayed_as_its_messages_are_taken_in_flight(config: Path, tmp_path: Path) -> None:
+    start = 100 * 10**9
+    parts = [("drive", [wheel("left", 2.0)], [1.0]), ("fly", [wheel("left", 4.0, 9), wheel("b", 1.0)], [1.0, 3.0])]
+    with Writer(tmp_path / "bag", version=9) as writer:
+        connection = writer.add_connection("/status", "rover_msgs/msg/Status", typestore=STORE)
+        for i, (phase, wheels, ranges) in enumerate(parts):
+            stamp = start + i * 10**8
+            writer.write(connection, stamp, status(stamp, phase, wheels, ranges))
+    (tmp_path / "map.yaml").write_text("channels: from machine")
+    library, _ = build_config(config)
+    done = replay_foreign(tmp_path / "bag", tmp_path / "map.yaml", library=str(library), output=tmp_path / "out")
+    assert not done.unmapped
+    assert columns(tmp_path / "out", "drive.inputs.ranges")[1].tolist()[-1][:3] == [1.0, 3.0, 0.0]
+    assert columns(tmp_path / "out", "drive.inputs.phase")[1].tolist() == [1, 1]
+    assert columns(tmp_path / "out", "drive.inputs.left_id")[1].tolist() == [0, 2]

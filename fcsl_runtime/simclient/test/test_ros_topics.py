@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import json
 import math
@@ -22,7 +21,6 @@ from simclient.bag import Bag
 from simclient.errors import TwinError
 from simclient.machine_build import build_config
 from simclient.replay import replay
-from simclient.ros import native
 from simclient.ros.publish_queue import PublishQueue, RunTopics
 from simclient.ros.topics import RosTopic, SampleInput, composer_of, reader_of, topics_of
 from simclient.run import Run, open_run

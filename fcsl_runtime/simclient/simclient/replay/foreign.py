@@ -14,6 +14,7 @@ from ..c_run import CSeries
 from ..descriptor import Channel, Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..paths import split_path
+from ..ros.topics import readings_of, topics_of
 from ..run import Run
 from .expect import Comparison, table
 from .mapping import Entry, Map
@@ -185,7 +186,15 @@ def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel
             f"{entry.location}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
         )
     taken = replace(entry, fields=(channel.ros_field,), axes=axes)
+    choices, shorter = _reading(machine, channel)
+    taken = replace(taken, choices=choices, shorter=shorter)
     return replace(taken, frame=channel.ros_frame, child_frame=channel.ros_child_frame), channel
+
+
+def _reading(machine: Machine, channel: Channel) -> tuple[tuple[str | int, ...], bool]:
+    """What the indices of a mapped channel stand for, and whether its list may be shorter."""
+    topic = next(t for t in topics_of(machine) if channel in t.channels)
+    return readings_of(topic)[topic.channels.index(channel)]
 
 
 def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:

@@ -84,7 +84,8 @@ _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 class Entry:
     """One source of one channel or expectation (`target`), as written. Missing keys are empty; timeout_ns is then 0.
 
-    The frames are those of the channel's `ros` block, if the entry takes its field from there.
+    Frames, choices and whether a list may be shorter are those of the channel's `ros` block, if the entry takes its field
+    from there.
     """
 
     target: str
@@ -101,6 +102,8 @@ class Entry:
     frame: str = ""
     child_frame: str = ""
     states: tuple[str, ...] = ()
+    choices: tuple[str | int, ...] = ()
+    shorter: bool = False
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ _REFUSED = {
     "range": "out of range",
     "nan": "with a NaN",
     "unmeasured": "not measured",
+    "unknown": "with none of the choices",
     "rotation": "with a rotation of length zero or infinity",
 }
 #: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
@@ -77,6 +78,8 @@ def wish(bag: Bag, entry: Entry, scalar: str, count: int, null_refused: bool = F
         scale=entry.scale,
         offset=entry.offset,
         null_refused=null_refused,
+        choices=entry.choices,
+        shorter=entry.shorter,
     )
     return Wish(entry, topic, pick)
 

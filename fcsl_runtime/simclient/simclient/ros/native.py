@@ -18,6 +18,8 @@ from ..library import bind_runtime, runtime_library
 
 #: FCSL_ROS_NONE
 NONE = 0xFFFFFFFF
+#: FCSL_ROS_CHOICE
+CHOICE = 10
 #: fcsl_ros_status_t: the result of reading a message, or a value of it.
 REASONS = (
     "taken",

@@ -58,6 +58,24 @@ def reader_of(topic: RosTopic) -> Reader:
     return Reader.compiled(topic.message.reader, columns)
 
 
+def readings_of(topic: RosTopic) -> list[tuple[tuple[str | int, ...], bool]]:
+    """Of each channel what its indices stand for, () without choices, and whether its list may be shorter."""
+    conversion = native.CReaderConversion.from_address(topic.message.reader)
+    values = [conversion.values[i] for i in range(conversion.value_count)]
+    return [(_choices(conversion, value), bool(value.limited)) for value in values]
+
+
+def _choices(conversion: native.CReaderConversion, value: native.CValue) -> tuple[str | int, ...]:
+    if not value.choice_count:
+        return ()
+    if value.first_choice != native.NONE:
+        return tuple(conversion.choices[value.first_choice + i] for i in range(value.choice_count))
+    anchor = conversion.terms[conversion.rows[value.first_row].first_term].anchor
+    parts = (conversion.parts[i] for i in range(conversion.part_count))
+    part = next(part for part in parts if part.code == native.CHOICE and part.size == anchor)
+    return tuple(conversion.names[part.first + i].decode() for i in range(part.count))
+
+
 def sources_of(topic: RosTopic) -> list[Source]:
     """What fills the topic's message, in a machine struct (memory 0), for another message that has some of it."""
     return [
