@@ -97,6 +97,13 @@ def test_a_project_links_it_and_computes_what_hosts_do(
     assert int(stack) <= machine["stack_bytes"]["step"] < 4 * int(stack)
 
 
+def test_a_level_of_optimisation_is_taken(
+    lander: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = build(LANDER, tmp_path / "small", capsys, "gcc -Os")
+    assert small["machines"][0]["functions"]["code"] < lander[1]["machines"][0]["functions"]["code"]
+
+
 def test_what_it_needs_is_what_a_linker_misses(lander: tuple[Path, dict[str, Any]]) -> None:
     """Without any library; and nothing of it is in RAM."""
     folder, report = lander

@@ -18,11 +18,11 @@ from ..driver.library import check_distinct, move, write_sources
 from ..driver.monitors import compile_monitor
 from ..driver.passes import Compilation, compile_machine
 from ..driver.symbols import ALLOWED
-from ..driver.toolchain import ToolchainError, compile_objects, include_dirs, toolchain_of
+from ..driver.toolchain import C, ToolchainError, compile_objects, include_dirs, toolchain_of
 from ..model.choices import DEFAULT_TARGET
 from .archive import archive
 from .code import Code, Sizes
-from .processors import MACHINE_FLAGS, Processor
+from .processors import Processor
 
 #: Headers that the project's own code includes.
 _HEADERS = ("fcsl_machine.h", "fcsl_monitor.h", "fcsl_hw.h", "fcsl_math.h")
@@ -67,8 +67,8 @@ def build_firmware(
 ) -> Firmware:
     """Writes the library, the machines' C beside it, and in `fcsl/` the headers that a project includes. After an error the
     folder is unchanged. Raises DiagnosticError, ToolchainError, UsageError."""
-    command = [*processor.command, *MACHINE_FLAGS]
-    found = " ".join([toolchain_of(processor.command), *MACHINE_FLAGS])
+    command = processor.compile_command
+    found = toolchain_of(processor.command, C._replace(flags=processor.machine_flags))
     compilations = [
         compile_machine(path, found, "emit", strict, target, instances=instances, folds=False) for path in configs
     ]

@@ -22,7 +22,7 @@ PROCESSORS = {
 }
 #: Flags for every machine: those of hosts, but for position-independent code, and so that a linker leaves out what is not
 #: called and the stack is known.
-MACHINE_FLAGS = (
+_FLAGS = (
     *(flag for flag in FLAGS if flag not in ("-fPIC", "-fvisibility=hidden")),
     *("-ffunction-sections", "-fdata-sections", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables"),
     *("-fno-pic", "-fstack-usage"),
@@ -34,6 +34,18 @@ class Processor(NamedTuple):
 
     name: str
     command: tuple[str, ...]
+    headers: tuple[str, ...] = ()  # options that name the folder of headers; it is no part of build_hash
+
+    @property
+    def machine_flags(self) -> tuple[str, ...]:
+        """Flags for every machine; a level of optimisation in the command is taken instead of theirs."""
+        chosen = any(word.startswith("-O") for word in self.command)
+        return tuple(flag for flag in _FLAGS if not (chosen and flag.startswith("-O")))
+
+    @property
+    def compile_command(self) -> tuple[str, ...]:
+        """Command that compiles machines."""
+        return (*self.command, *self.machine_flags, *self.headers)
 
 
 def bare_metal() -> Path:
@@ -50,9 +62,8 @@ def find_processor(text: str) -> Processor:
         raise UsageError(f"--processor `{text}`: {'names nothing' if not text.strip() else error}") from None
     refuse_inexact(options, "--processor")
     if first in PROCESSORS:
-        return Processor(
-            first, (_clang(first), *PROCESSORS[first], *options, "-idirafter", str(bare_metal() / "include"))
-        )
+        headers = ("-idirafter", str(bare_metal() / "include"))
+        return Processor(first, (_clang(first), *PROCESSORS[first], *options), headers)
     if shutil.which(first) is None:
         known = ", ".join(PROCESSORS)
         raise UsageError(

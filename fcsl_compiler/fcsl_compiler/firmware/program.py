@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..driver.toolchain import ToolchainError, compile_objects, include_dirs, run_compiler
 from .library import Firmware
-from .processors import MACHINE_FLAGS, Processor, bare_metal
+from .processors import Processor, bare_metal
 
 _LINK_FLAGS = ("-nostdlib", "-fuse-ld=lld", "-Wl,--gc-sections")
 
@@ -25,7 +25,7 @@ def link_program(
     """Compiles `sources`, with FCSL_MACHINE_BYTES of the first machine, and links them with the library and runtime.c as the
     linker script says. Raises ToolchainError."""
     bytes_ = firmware.machines[0].struct_bytes
-    command = [*processor.command, *MACHINE_FLAGS, f"-DFCSL_MACHINE_BYTES={bytes_}"]
+    command = [*processor.compile_command, f"-DFCSL_MACHINE_BYTES={bytes_}"]
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".program-") as folder:
         objects = compile_objects(
             [*sources, bare_metal() / "runtime.c"], [*includes, *include_dirs()], Path(folder), command
