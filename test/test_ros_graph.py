@@ -29,7 +29,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 from zenoh.ext import AdvancedSubscriber, HistoryConfig, declare_advanced_subscriber
 
-from fcsl_msgs.msg import MachineState
+from fcsl_msgs.msg import Event, MachineState
 from simclient import VarClient
 from simclient.bag.bag import Bag
 from simclient.bus.endpoint import zenoh_locator
@@ -355,3 +355,40 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     assert {(m.pose.pose.position.z, m.pose.covariance[0], m.pose.covariance[7]) for m in poses} == {(4.0, -1.0, 0.0)}
     assert max(tick_of(m) for m in poses) > 200
     assert [mode for mode, _ in groupby(modes)] == ["pumping", "off"]
+
+
+def test_events_of_a_simulation(tmp_path: Path) -> None:
+    """Each with its own tick and text, several of a tick in their order."""
+    law = """
+class Law:
+    outputs = {"y": "i64"}
+
+    def execute(self):
+        self.y = self.y + 1
+        if self.y % 20 == 0:
+            event("lap", self.y, severity="warning")
+            event("again")
+"""
+    (tmp_path / "law.py").write_text(law)
+    machine = {"tick_hz": HZ, "initial_state": "RUN", "publish": [], "algorithms": {"Law": {"source": "law.py"}}}
+    machine |= {"instances": {"law": {"algorithm": "Law"}}, "states": {"RUN": {"schedule": {"law": HZ}}}}
+    (tmp_path / "laps.json").write_text(json.dumps(machine))
+    simulation = TANK_SIM | {"controller": {"machine": "laps.json"}, "connections": []}
+    (tmp_path / "laps.sim.json").write_text(json.dumps(simulation))
+    endpoint = free_endpoint()
+    events: list[Event] = []
+    options = ["--ros", endpoint, "--namespace", "r1", "--speed", "2"]
+    with started("fcsl-sim", "run", tmp_path / "laps.sim.json", *options) as sim, bridge(endpoint) as session:
+        assert tokens(session)["r1/laps/events"] == ("MP", EVENT)
+        subscriber = session.declare_subscriber("r1/laps/events", lambda s: events.append(read(s, Event)))
+        _, complaint = sim.communicate(timeout=LONG_S)
+        subscriber.undeclare()
+    assert sim.returncode == 0, complaint
+    assert len(events) > 10
+    first = events[0].tick
+    wanted: list[tuple[int, str, list[str]]] = []
+    for tick in range(first, first + 10 * len(events), 20):
+        wanted += [(tick, "lap", [str(tick + 1)]), (tick, "again", [])]
+    assert [(e.tick, e.text, list(e.values)) for e in events] == wanted
+    assert {(e.instance, e.text, e.severity) for e in events} == {("law", "lap", 30), ("law", "again", 20)}
+    assert [tick_of(e) for e in events] == [e.tick for e in events]

@@ -293,8 +293,7 @@ static int open_ros_graph(program_t *program)
     /* With a HAL of the same graph the commands are there already. */
     const fcsl_ros_graph_options_t options = {.endpoint = program->options.ros,
                                               .name_space = program->options.name_space,
-                                              .machine = fcsl_run_machine(loop->run),
-                                              .safe = fcsl_run_safe_data(loop->run),
+                                              .run = loop->run,
                                               .actuators = !options_hal_is_ros(&program->options),
                                               .simulated = !loop->realtime};
     loop->ros = fcsl_ros_graph_open(&options, &loop->history, &error);

@@ -84,12 +84,19 @@ static int post(fcsl_ros_graph_t *g, const published_tick_t *tick, uint32_t coun
     g->room--;
     for (uint32_t i = 0; i < count; i++) {
         if (i >= g->topics.latched_count && !fcsl_bus_matched(g->bus, i)) {
+            ros_topics_skip(&g->topics, i);
             continue;
         }
-        const size_t size = ros_topics_write(&g->topics, i, tick, stamp, g->message);
-        if (size > 0u && fcsl_bus_post(g->bus, i, g->message, size) != 0) {
-            ros_topics_unsay(&g->topics, i);
-            failed = 1;
+        for (uint32_t n = 0; n < g->topics.topics[i].most; n++) {
+            const size_t size = ros_topics_write(&g->topics, i, tick, stamp, g->message);
+            if (size == 0u) {
+                break;
+            }
+            if (fcsl_bus_post(g->bus, i, g->message, size) != 0) {
+                ros_topics_unsay(&g->topics, i);
+                failed = 1;
+                break;
+            }
         }
     }
     return failed ? -1 : 0;
@@ -124,7 +131,7 @@ static uint32_t size_ring(fcsl_ros_graph_t *g, size_t *longest)
     *longest = 0;
     for (uint32_t i = 0; i < g->topics.count; i++) {
         const uint32_t bytes = g->topics.topics[i].longest;
-        tick_bytes += bytes + ENTRY_BYTES_MAX;
+        tick_bytes += (uint64_t)g->topics.topics[i].most * (bytes + ENTRY_BYTES_MAX);
         *longest = bytes > *longest ? bytes : *longest;
     }
     const uint64_t ticks = RING_BYTES / tick_bytes;
@@ -173,7 +180,7 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
     const history_reader_sink_t sink = {
         .ctx = g, .wants = wants_all, .skip = skip_none, .ready = is_ready, .observe = see, .put = put};
     g->simulated = options->simulated;
-    if (history_reader_open(&g->reader, history, options->machine->tick_hz, &sink) != 0) {
+    if (history_reader_open(&g->reader, history, fcsl_run_machine(options->run)->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
     } else if (ros_topics_build(&g->topics, options, error) == 0 && listen_on(g, options->endpoint, error) == 0) {
         return g;

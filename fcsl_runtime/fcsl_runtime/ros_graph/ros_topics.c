@@ -10,6 +10,8 @@
 #include "endpoint.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
+#include "fcsl/fcsl_tick_time.h"
+#include "messages/event_message.h"
 #include "messages/schema.h"
 #include "messages/type_hash.h"
 #include "machine/fault_place.h"
@@ -19,6 +21,7 @@ enum {
     HEAD_BYTES = 4 + 8 + 8 + 8,
     CLOCK_BYTES = 4 + 8,
     PADDING_BYTES = 8, /* before a number or a length, at most, with that length */
+    EVENTS_OF_A_TICK = 8, /* that are put; more follow with the next one */
     DEPTH_LATCHED = 1,
     DEPTH_EVENT = 100,
     DEPTH_COMMAND = 10,
@@ -95,6 +98,16 @@ static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *nam
                : announce(topic, fixed->type, fixed->schema, fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
 }
 
+static int add_events(ros_topics_t *topics, const char *name_space, fcsl_error_t *error)
+{
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    topic->kind = ROS_EVENTS;
+    topic->longest = (uint32_t)fcsl_event_message_capacity(topics->machine);
+    return ros_key_write(topic->key, name_space, topics->machine->name, "events", error) != 0
+               ? -1
+               : announce(topic, "fcsl_msgs/msg/Event", FCSL_SCHEMA_EVENT, DEPTH_EVENT, error);
+}
+
 /* Of all topics only this one is outside of the namespace. */
 static int add_clock(ros_topics_t *topics, fcsl_error_t *error)
 {
@@ -149,17 +162,20 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
 
 int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error)
 {
-    const fcsl_machine_t *machine = options->machine;
+    const fcsl_machine_t *machine = fcsl_run_machine(options->run);
     const char *name_space = options->name_space;
-    *topics = (ros_topics_t){.machine = machine, .safe = options->safe};
+    *topics = (ros_topics_t){.run = options->run, .machine = machine, .safe = fcsl_run_safe_data(options->run)};
     topics->topics =
-        calloc((size_t)machine->instance_count + machine->ros_message_count + FIXED_COUNT + 1u, sizeof *topics->topics);
+        calloc((size_t)machine->instance_count + machine->ros_message_count + FIXED_COUNT + 2u, sizeof *topics->topics);
     if (topics->topics == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
     int failed = 0;
     for (uint32_t i = 0; i < FIXED_COUNT && !failed; i++) {
         failed = add_fixed(topics, &FIXED[i], name_space, error);
+    }
+    if (machine->event_site_count > 0u && !failed) {
+        failed = add_events(topics, name_space, error);
     }
     if (options->simulated && !failed) {
         failed = add_clock(topics, error);
@@ -174,6 +190,9 @@ int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *optio
         if (message->direction == FCSL_SENSOR ? options->sensors : options->actuators) {
             failed = add_mapped(topics, message, name_space, error);
         }
+    }
+    for (uint32_t i = 0; i < topics->count; i++) {
+        topics->topics[i].most = topics->topics[i].kind == ROS_EVENTS ? EVENTS_OF_A_TICK : 1u;
     }
     return failed;
 }
@@ -214,6 +233,22 @@ static size_t write_tick_message(const fcsl_machine_t *machine, ros_topic_t *top
     memcpy(topic->last_message, bytes, length);
     topic->last_message_bytes = length;
     return length;
+}
+
+/* The next event up to the tick, whose time `stamp` is; that of the event is before it by their ticks. */
+static size_t write_event(ros_topics_t *topics, ros_topic_t *topic, fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    fcsl_told_event_t event;
+    const uint64_t next = fcsl_run_next_event(topics->run, topic->next_event, &event);
+    if (next == 0 || event.tick > stamp.tick) {
+        return 0;
+    }
+    const uint64_t hz = topics->machine->tick_hz;
+    const fcsl_stamp_t own = {.tick = event.tick,
+                              .time_ns = stamp.time_ns -
+                                         (fcsl_tick_time_ns(hz, stamp.tick) - fcsl_tick_time_ns(hz, event.tick))};
+    topic->next_event = next;
+    return fcsl_event_message(topics->machine, &event, own, bytes, topic->longest);
 }
 
 /* Whether a sample came for the tick, or nothing says when samples come. */
@@ -263,6 +298,8 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const published_t
         return topic->layout.size;
     case ROS_MAPPED:
         return write_mapped(topics, topic, tick, stamp, bytes);
+    case ROS_EVENTS:
+        return write_event(topics, topic, stamp, bytes);
     default:
         return write_tick_message(topics->machine, topic, data, stamp, bytes);
     }
@@ -270,5 +307,14 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const published_t
 
 void ros_topics_unsay(ros_topics_t *topics, uint32_t number)
 {
-    topics->topics[number].last_message_bytes = 0;
+    ros_topic_t *topic = &topics->topics[number];
+    topic->last_message_bytes = 0;
+    topic->next_event -= topic->kind == ROS_EVENTS ? 1u : 0u;
+}
+
+void ros_topics_skip(ros_topics_t *topics, uint32_t number)
+{
+    if (topics->topics[number].kind == ROS_EVENTS) {
+        topics->topics[number].next_event = fcsl_run_event_counts(topics->run).told;
+    }
 }

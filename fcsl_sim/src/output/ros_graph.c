@@ -16,13 +16,8 @@ int fcsl_sim_ros(fcsl_sim_t *sim, const char *endpoint, const char *name_space, 
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;
     }
-    const fcsl_ros_graph_options_t options = {.endpoint = endpoint,
-                                              .name_space = name_space,
-                                              .machine = sim->machine,
-                                              .safe = fcsl_run_safe_data(sim->run),
-                                              .sensors = 1,
-                                              .actuators = 1,
-                                              .simulated = 1};
+    const fcsl_ros_graph_options_t options = {
+        .endpoint = endpoint, .name_space = name_space, .run = sim->run, .sensors = 1, .actuators = 1, .simulated = 1};
     sim->ros = fcsl_ros_graph_open(&options, &sim->published->history, error);
     return sim->ros ? fcsl_ros_graph_start(sim->ros, error) : -1;
 }

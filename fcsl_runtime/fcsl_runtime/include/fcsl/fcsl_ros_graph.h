@@ -21,14 +21,13 @@ typedef struct fcsl_ros_graph fcsl_ros_graph_t;
 typedef struct {
     const char *endpoint;          /* tcp:HOST:PORT, to listen on; the bridge connects there */
     const char *name_space;        /* of the topics, "" for none */
-    const fcsl_machine_t *machine; /* its struct is part 0 of the history */
-    const void *safe; /* the machine's struct with safe values (fcsl_run_safe_data), or null */
+    const fcsl_run_t *run; /* its machine's struct is part 0 of the history */
     int sensors;      /* with the topics of mapped sensor channels */
     int actuators;    /* with those of actuators and reports */
     int simulated; /* time is the machine's own, and `clock` tells it; else stamps are ROS time, of the system's clock */
 } fcsl_ros_graph_options_t;
 
-/* Listens and declares all topics; nothing is put before fcsl_ros_graph_start. History and machine must outlive it. Null with
+/* Listens and declares all topics; nothing is put before fcsl_ros_graph_start. History and run must outlive it. Null with
  * `error`. */
 fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, const fcsl_history_t *history,
                                       fcsl_error_t *error);
