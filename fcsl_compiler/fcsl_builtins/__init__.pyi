@@ -210,7 +210,9 @@ def hw_read_u32(address: int) -> int:
 def hw_write_u32(address: int, value: int) -> None:
     """sets a board register or port."""
 
-def event(text: str, *values: bool | float | Health, severity: Literal["debug", "info", "warning", "error"] = "info") -> None:
+def event(
+    text: str, *values: bool | float | Health, severity: Literal["debug", "info", "warning", "error"] = "info"
+) -> None:
     """reports what happened, with up to four scalars, once this run of `execute` completes; severity: "debug", "info", "warning" or "error"."""
 
 def dot(a: _Array, b: _Array) -> float:

@@ -83,9 +83,8 @@ def hardware(name: str, doc: str) -> str:
 
 def event() -> str:
     severity = f'severity: Literal[{", ".join(map(json.dumps, SEVERITIES))}] = "info"'
-    return function(
-        EVENT, f"text: str, *values: bool | float | Health, {severity}", "None", EVENT_DOC.split(": ", 1)[1]
-    )
+    arguments = f"\n    text: str, *values: bool | float | Health, {severity}\n"
+    return function(EVENT, arguments, "None", EVENT_DOC.split(": ", 1)[1])
 
 
 def library_function(name: str) -> str:

@@ -31,8 +31,8 @@ from .process_tap import ProcessTap
 from .twin import Twin
 
 if TYPE_CHECKING:
-    from ..instance_times import InstanceTime
     from ..events import Event
+    from ..instance_times import InstanceTime
     from ..requirements import Verdict
     from .profile import Samples
 

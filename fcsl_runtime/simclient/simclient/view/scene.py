@@ -28,8 +28,8 @@ import numpy as np
 import rerun as rr
 
 from ..bag import Array
-from ..bag.states import StateSample
 from ..bag.events import RecordedEvent
+from ..bag.states import StateSample
 from ..bag.violations import Violation
 from .lines import TIMELINE, send_lines, times
 from .panels import Choice, choose_by_views, choose_default
