@@ -61,9 +61,19 @@ void *new_machine(const fcsl_machine_t *machine)
 
 uint32_t offset_of(const fcsl_machine_t *machine, const char *path)
 {
-    for (uint32_t i = 0; i < machine->field_count; ++i) {
+    for (uint32_t i = 0; machine->fields != NULL && i < machine->field_count; ++i) {
         if (strcmp(machine->fields[i].path, path) == 0) {
             return machine->fields[i].offset;
+        }
+    }
+    for (uint32_t i = 0; machine->fields == NULL && i < machine->instance_count; ++i) {
+        const fcsl_folded_instance_t *one = &machine->folded->instances[i];
+        const fcsl_fold_t *fold = &machine->folded->folds[one->fold];
+        const size_t name = strlen(machine->instances[i].name);
+        for (uint32_t j = 0; strncmp(machine->instances[i].name, path, name) == 0 && j < fold->field_count; ++j) {
+            if (strcmp(fold->fields[j].path, path + name) == 0) {
+                return one->offset + fold->fields[j].offset;
+            }
         }
     }
     fprintf(stderr, "bench: %s has no field %s\n", machine->name, path);
