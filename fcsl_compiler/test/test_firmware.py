@@ -4,12 +4,14 @@ a processor; a Cortex-M7 flies in `make verify`."""
 
 from __future__ import annotations
 
+import io
 import json
 import platform
 import re
 import shutil
 import subprocess
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +63,11 @@ int main(void)
 """
 
 
-def build(config: Path, folder: Path, capsys: pytest.CaptureFixture[str], processor: str = "gcc") -> dict[str, Any]:
+def build(config: Path, folder: Path, processor: str = "gcc") -> dict[str, Any]:
     """The report of `--json`."""
-    assert main(["build", str(config), "--processor", processor, "-o", str(folder), "--json"]) == 0
-    report: dict[str, Any] = json.loads(capsys.readouterr().out)["report"]
+    with redirect_stdout(io.StringIO()) as printed:
+        assert main(["build", str(config), "--processor", processor, "-o", str(folder), "--json"]) == 0
+    report: dict[str, Any] = json.loads(printed.getvalue())["report"]
     return report
 
 
@@ -78,15 +81,14 @@ def run_project(folder: Path, name: str, arguments: Sequence[str]) -> list[str]:
     return subprocess.run([program], check=True, capture_output=True, text=True).stdout.split()
 
 
-@pytest.fixture
-def lander(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> tuple[Path, dict[str, Any]]:
+@pytest.fixture(scope="module")
+def lander(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """Folder and report."""
-    return tmp_path, build(LANDER, tmp_path, capsys)
+    folder = tmp_path_factory.mktemp("lander")
+    return folder, build(LANDER, folder)
 
 
-def test_a_project_links_it_and_computes_what_hosts_do(
-    lander: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_project_links_it_and_computes_what_hosts_do(lander: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     folder, report = lander
     bytes_, stack, digest = run_project(folder, "static", [f"-L{folder}", "-llander_control", "-lm"])
     assert main(["build", str(LANDER), "-o", str(tmp_path / "host")]) == 0
@@ -97,10 +99,8 @@ def test_a_project_links_it_and_computes_what_hosts_do(
     assert int(stack) <= machine["stack_bytes"]["step"] < 4 * int(stack)
 
 
-def test_a_level_of_optimisation_is_taken(
-    lander: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    small = build(LANDER, tmp_path / "small", capsys, "gcc -Os")
+def test_a_level_of_optimisation_is_taken(lander: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    small = build(LANDER, tmp_path / "small", "gcc -Os")
     assert small["machines"][0]["functions"]["code"] < lander[1]["machines"][0]["functions"]["code"]
 
 
@@ -149,7 +149,7 @@ def test_only_the_functions_of_fcsl_math_that_are_called(tmp_path: Path, capsys:
         },
         {"a": text},
     )
-    build(config, tmp_path / "fused", capsys, "gcc -mfma -msse4.1")
+    build(config, tmp_path / "fused", "gcc -mfma -msse4.1")
     listed = subprocess.run(
         ["ar", "t", tmp_path / "fused/libturn.a"], check=True, capture_output=True, text=True
     ).stdout
@@ -160,8 +160,8 @@ def test_only_the_functions_of_fcsl_math_that_are_called(tmp_path: Path, capsys:
     assert not (tmp_path / "plain").exists()
 
 
-def test_externs_in_c_are_compiled_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    report = build(GUARD, tmp_path, capsys)
+def test_externs_in_c_are_compiled_too(tmp_path: Path) -> None:
+    report = build(GUARD, tmp_path)
     assert "read_cpu_temp" not in report["needs"]
     assert (
         "cpu_temp_stub-2.o"
@@ -252,9 +252,9 @@ def test_a_damaged_object_is_an_error(lander: tuple[Path, dict[str, Any]], tmp_p
 
 
 @pytest.mark.skipif(shutil.which("clang-19") is None, reason="clang-19 compiles for Cortex-M7")
-def test_a_cortex_m7(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cortex_m7(tmp_path: Path) -> None:
     """It needs functions of the compiler's run-time library alone; the library is of ARM, and its constants stay in flash."""
-    report = build(LANDER, tmp_path, capsys, "cortex-m7")
+    report = build(LANDER, tmp_path, "cortex-m7")
     assert report["needs"] and all(name.startswith("__aeabi_") for name in report["needs"])
     (machine,) = report["machines"]
     assert machine["functions"]["data"] == machine["descriptor"]["data"] == 0
