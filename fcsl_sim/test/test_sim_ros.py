@@ -47,11 +47,8 @@ def test_without_a_list_there_are_none(load_sim: LoadSim) -> None:
 @pytest.mark.parametrize(
     ("items", "code", "said"),
     [
-        (
-            [X | {"type": "nav_msgs/Odometri"}],
-            "E236",
-            "`nav_msgs/Odometri` is not a message that a value can be mapped to",
-        ),
+        ([X | {"type": "nav_msgs/Odometri"}], "E236", "there is no message `nav_msgs/Odometri`"),
+        ([X | {"field": "child_frame_id", "choices": ["a", "b"]}], "E258", "is f64, and with `choices` it is an index"),
         ([X | {"field": "pose.position.z"}], "E237", "pose"),
         ([X | {"field": "pose.pose.position"}], "E238", "pose.pose.position"),
         ([X, X], "E241", "belongs to"),
