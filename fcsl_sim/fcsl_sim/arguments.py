@@ -20,6 +20,7 @@ _EXAMPLES = {
     "run": "craft.sim.json --record flight --seed 7",
     "plot": "craft.sim.json -o craft.png",
     "campaign": "craft.study.json --cases 200",
+    "tune": "craft.study.json -o gains",
     "trim": "hover.trim.json -o hover.sim.json",
     "linearise": "craft.sim.json --input engine.inputs.throttle --measure body.outputs.height -o craft.json",
     "response": "craft.sim.json --input controller.throttle --measure body.outputs.height --plot response.png",
@@ -62,6 +63,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     _add_run(run)
     _add_plot(_add(commands, "plot", "draw a simulation"))
     _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
+    _add_tune(_add(commands, "tune", "find parameters of controllers, as the `tune` of a study says"))
     _add_trim(_add(commands, "trim", "find an equilibrium of a plant"))
     _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
     _add_response(_add(commands, "response", "measure the frequency response of the loop with the compiled controller"))
@@ -181,12 +183,24 @@ def _add_campaign(command: argparse.ArgumentParser) -> None:
     help_output = "folder of the results; a campaign that was interrupted goes on in it (default: NAME.campaign, here)"
     command.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_output)
     command.add_argument("--cases", type=_count, metavar="N", help="number of cases; replaces the file's")
+    command.add_argument("--case", type=int, metavar="I", help="fly this case alone and print what it gives")
+    command.add_argument("--record", type=Path, metavar="BAG", help="with --case: new directory for its bag")
+    _add_many_flights(command)
+
+
+def _add_tune(command: argparse.ArgumentParser) -> None:
+    command.add_argument("study", type=Path, help="*.study.json with `tune` (docs/guide/campaigns.md)")
+    help_output = "folder of the results; a search that was interrupted goes on in it (default: NAME.tune, here)"
+    command.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_output)
+    _add_many_flights(command)
+
+
+def _add_many_flights(command: argparse.ArgumentParser) -> None:
+    _add_parameters(command)
     command.add_argument("--jobs", type=_count, metavar="N", help="processes (default: one for each core)")
     command.add_argument(
         "--restart", action="store_true", help="remove the results that the folder has, and begin anew"
     )
-    command.add_argument("--case", type=int, metavar="I", help="fly this case alone and print what it gives")
-    command.add_argument("--record", type=Path, metavar="BAG", help="with --case: new directory for its bag")
     help_engine = "who flies: processes of this machine (default), or a Ray cluster (needs the Python package ray)"
     command.add_argument("--engine", choices=("local", "ray"), default="local", help=help_engine)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")

@@ -162,6 +162,12 @@ def _campaign(options: argparse.Namespace) -> int:
     return run_campaign(options)
 
 
+def _tune(options: argparse.Namespace) -> int:
+    from .tune.command import run_tune
+
+    return run_tune(options)
+
+
 def _trim(options: argparse.Namespace) -> int:
     from .linear.command import run_trim
 
@@ -375,6 +381,7 @@ _COMMANDS = {
     "run": _run,
     "plot": _plot,
     "campaign": _campaign,
+    "tune": _tune,
     "trim": _trim,
     "linearise": _linearise,
     "response": _response,

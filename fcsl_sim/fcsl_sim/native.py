@@ -143,6 +143,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),
+    "fcsl_parameters_write": (c_int64, [POINTER(CMachine), ptr, ptr, ptr, c_size_t]),
     **VERDICTS,
 }
 
@@ -152,6 +153,8 @@ _LIBRARY = "libfcsl_sim.so"
 #: Largest truth message in bytes: a model struct has at most 1 MiB (src/models/model.h), plus padding and header.
 _MAX_TRUTH_BYTES = 3 << 20
 _MAX_DESCRIPTION_BYTES = 1 << 20
+#: FCSL_PARAMETERS_BYTES_MAX
+_MAX_PARAMETER_BYTES = 1 << 20
 
 
 @functools.cache
@@ -317,6 +320,17 @@ class Simulation:
         """Addresses of the structs of all controllers, the first one's first."""
         data = self._lib.fcsl_run_data
         return [int(data(run)) for run in (self.hosted(), *self.companion_runs().values())]
+
+    def changed_parameters(self, number: int, compiled: Simulation) -> str:
+        """The parameter file of what differs between a controller and that of another simulation of it."""
+        text = ctypes.create_string_buffer(_MAX_PARAMETER_BYTES)
+        run = (self.hosted(), *self.companion_runs().values())[number]
+        data, other = self.controller_data()[number], compiled.controller_data()[number]
+        machine = self._lib.fcsl_run_machine(run)
+        size = self._lib.fcsl_parameters_write(machine, data, other, text, len(text))
+        if size < 0:
+            raise SimError(f"a parameter file has at most {_MAX_PARAMETER_BYTES} bytes")
+        return text.raw[:size].decode("utf-8", "replace")
 
     def companion_runs(self) -> dict[str, int]:
         """Address of the fcsl_run_t of each controller beside the first one, by its name; as `hosted`."""

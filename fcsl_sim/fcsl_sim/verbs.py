@@ -76,6 +76,7 @@ COMMANDS = Commands(
         [
             _verb("sim", "fly a machine against plant models, as a *.sim.json says", "run"),
             _verb("campaign", "fly a simulation many times, with dispersed parameters"),
+            _verb("tune", "find parameters of a controller by flights of a study"),
             _verb("trim", "find an equilibrium of a plant"),
             _verb("linearise", "print and write the linear equations of a plant around a point"),
             _verb("response", "measure the frequency response of the loop with the compiled controller"),

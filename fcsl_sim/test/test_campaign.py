@@ -12,11 +12,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -25,11 +25,11 @@ from scipy import stats
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimError
-from fcsl_sim.campaign.flight import Outcome
+from fcsl_sim.campaign.flight import Flight
 from fcsl_sim.campaign.metric import Metric
 from fcsl_sim.campaign.report import wilson
 from fcsl_sim.campaign.study import read_study
-from fcsl_sim.campaign.workers import fly_in_processes
+from fcsl_sim.campaign.workers import Pool
 from fcsl_sim.cli import main
 
 TEST = Path(__file__).resolve().parent
@@ -583,16 +583,16 @@ def test_no_process_is_left_when_the_outcomes_are_not_wanted_any_more(write: Wri
         return found
 
     before = workers()
-    outcomes = fly_in_processes(study, iter(range(1_000_000)), 2, None, lambda: None)
-    assert next(outcomes).verdict in ("passed", "failed") and len(workers() - before) == 2
-    cast("Generator[Outcome]", outcomes).close()
+    with Pool(study, 2, None) as pool:
+        _, outcome = next(pool.fly(map(Flight, range(1_000_000)), lambda: None))
+        assert outcome.verdict in ("passed", "failed") and len(workers() - before) == 2
     assert workers() <= before
 
     def interrupt() -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        next(fly_in_processes(study, iter(range(1_000_000)), 2, None, interrupt))
+    with pytest.raises(KeyboardInterrupt), Pool(study, 2, None) as pool:
+        next(pool.fly(map(Flight, range(1_000_000)), interrupt))
     assert workers() <= before
 
 

@@ -7,7 +7,6 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,11 +16,11 @@ from ..errors import SimError
 from ..output import show
 from ..watchdog import Watchdog
 from . import report
-from .flight import Flights, Outcome
+from .engine import open_engine
+from .flight import Flight, Flights, Outcome
 from .requirements import requirements
 from .results import Results
 from .study import Study, read_study
-from .workers import fly_in_processes
 
 EXIT_FAILED = 1
 _PROGRESS_PERIOD_S = 2.0
@@ -30,7 +29,7 @@ _SUFFIXES = (".study.json", ".json")
 
 def run_campaign(options: Any) -> int:
     """Exit status: 0 if every case passed, else 1. Raises SimError or DiagnosticError."""
-    study = read_study(options.study, options.cases)
+    study = read_study(options.study, options.cases, options.parameters)
     for warning in study.config.warnings:
         print(warning, file=sys.stderr)
     if options.case is not None:
@@ -65,17 +64,10 @@ def _fly_missing(study: Study, results: Results, options: Any) -> None:
     if results.done == study.cases:
         return
     progress = _Progress(results)
-    for outcome in _engine(options, study, results, jobs, progress.show):
-        results.add(outcome)
+    with open_engine(options.engine, study, jobs, options.cases) as engine:
+        for _, outcome in engine.fly(map(Flight, results.missing()), progress.show):
+            results.add(outcome)
     progress.end()
-
-
-def _engine(options: Any, study: Study, results: Results, jobs: int, progress: Callable[[], None]) -> Iterator[Outcome]:
-    if options.engine == "ray":
-        from .ray_engine import fly_on_ray  # an extra, so imported only when asked for
-
-        return fly_on_ray(study, results.missing(), jobs, options.cases, progress)
-    return fly_in_processes(study, results.missing(), jobs, options.cases, progress)
 
 
 def _fly_one(study: Study, options: Any) -> int:

@@ -6,11 +6,14 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from fcsl_compiler.api.types import scalar_of
 from simclient.errors import TwinError
+from simclient.parameters import Given
 from simclient.requirements import Status
 from simclient.twin.trace import Columns, merged, value_offsets
 
@@ -29,6 +32,13 @@ from .study import Study, read_study
 #: Of the rows that a flight may leave for its metrics.
 _MAX_TRACE_BYTES = 1 << 28
 _TICK = "machine.tick"
+
+
+class Flight(NamedTuple):
+    """A case of a study. `gains`: of the parameters that `tune` names; empty: the machine's own values."""
+
+    case: int
+    gains: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,9 +89,9 @@ class Flights:
             )
 
     @classmethod
-    def of(cls, path: Path, cases: int | None = None) -> Flights:
+    def of(cls, path: Path, cases: int | None = None, parameters: Given | None = None) -> Flights:
         """Those of the study in a file. Raises SimError, TwinError or DiagnosticError."""
-        return cls(read_study(path, cases))
+        return cls(read_study(path, cases, parameters))
 
     @staticmethod
     def cases_of(path: Path) -> int:
@@ -91,11 +101,11 @@ class Flights:
     def close(self) -> None:
         self._base.close()
 
-    def config(self, case: int) -> SimConfig:
-        """The simulation with the seed and the values of this case."""
+    def config(self, case: int, gains: Sequence[float] = ()) -> SimConfig:
+        """The simulation with the seed and the values of this case, and with those of `tune`."""
         seed, values = self.study.seed_of(case), self.study.values(case)
         bits: dict[plan.Target, str] = {}
-        of_controllers: dict[plan.Target, Value] = {}
+        of_controllers: dict[plan.Target, Value] = dict(self._targets(gains))
         for one, value in zip(self.study.parameters, values, strict=True):
             if one.target[0] in self.study.config.machines:
                 of_controllers[one.target] = value
@@ -106,10 +116,12 @@ class Flights:
             flown = replace(flown, parameters=self._begin.with_values(of_controllers))
         return replace(self.study.config, seed=seed, plan=flown)
 
-    def fly(self, case: int, bag: Path | None = None, watchdog: Watchdog | None = None) -> Outcome:
+    def fly(
+        self, case: int, bag: Path | None = None, watchdog: Watchdog | None = None, gains: Sequence[float] = ()
+    ) -> Outcome:
         """What goes wrong in a flight is its outcome. bag: records it into this new folder. watchdog: ends the process with a
-        message that names a model that hangs."""
-        config = self.config(case)
+        message that names a model that hangs. gains: of `tune`."""
+        config = self.config(case, gains)
         given = case, config.seed, self.study.values(case)
         try:
             with Simulation(config.plan, config.tables) as sim:
@@ -134,6 +146,25 @@ class Flights:
                 return Outcome(*given, verdict, sim.status, sim.tick, digest, numbers, failed_by=failed_by)
         except (SimError, TwinError, MetricError) as error:
             return not_flown(self.study, case, str(error))
+
+    def trace(self, case: int, gains: Sequence[float] = ()) -> Columns:
+        """What the metrics read, of all ticks if one does. Raises SimError or TwinError."""
+        config = self.config(case, gains)
+        with Simulation(config.plan, config.tables) as sim:
+            return self._run(sim)
+
+    def with_gains(self, gains: Sequence[float]) -> plan.Plan:
+        """The plan of the study with gains, and else as its file says."""
+        return replace(self.study.config.plan, parameters=self._begin.with_values(self._targets(gains)))
+
+    def _targets(self, gains: Sequence[float]) -> dict[plan.Target, float]:
+        tuned = self.study.tune.parameters if self.study.tune and gains else ()
+        return {one.target: gain for one, gain in zip(tuned, gains, strict=True)}
+
+    def own_gains(self) -> tuple[float, ...]:
+        """The machine's own values of what `tune` names."""
+        tuned = self.study.tune.parameters if self.study.tune else ()
+        return tuple(float(self._begin.element(one.target)) for one in tuned)
 
     def _run(self, sim: Simulation) -> Columns:
         parts = self._base.addresses(self._ranges, of=sim)

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from simclient.parameters import Parameters
+
 from ..errors import SimError
-from .flight import CRASHED, Flights, Outcome, not_flown
+from .flight import CRASHED, Flight, Flights, Outcome, not_flown
 from .study import Study
 
 _PORTION = 16
@@ -24,44 +26,49 @@ _TRIES = 3
 class _Actor:
     """Lives in a worker."""
 
-    def __init__(self, study: str, cases: int | None):
-        self._flights = Flights.of(Path(study), cases)
+    def __init__(self, study: str, cases: int | None, parameters: Parameters | None):
+        self._flights = Flights.of(Path(study), cases, parameters)
 
-    def fly(self, cases: list[int]) -> list[Outcome]:
-        return [self._flights.fly(case) for case in cases]
-
-
-def fly_on_ray(
-    study: Study, cases: Iterator[int], jobs: int, given_cases: int | None, progress: Callable[[], None]
-) -> Iterator[Outcome]:
-    """As workers.fly_in_processes. Raises SimError without Ray, or if no worker can be started."""
-    try:
-        import ray
-    except ImportError:
-        raise SimError("`--engine ray` needs the Python package `ray`: python3 -m pip install ray") from None
-    if not ray.is_initialized():
-        local = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": jobs, "_node_ip_address": "127.0.0.1"}
-        ray.init(include_dashboard=False, log_to_driver=False, logging_level="ERROR", **local)
-    cluster = _Cluster(ray, study, cases, given_cases)
-    try:
-        yield from cluster.fly(jobs, progress)
-    finally:
-        ray.shutdown()
+    def fly(self, portion: list[Flight]) -> list[Outcome]:
+        return [self._flights.fly(flight.case, gains=flight.gains) for flight in portion]
 
 
-class _Cluster:
-    def __init__(self, ray: Any, study: Study, cases: Iterator[int], given_cases: int | None):
-        self.ray, self.study, self.cases, self.given_cases = ray, study, cases, given_cases
+class Cluster:
+    """As workers.Pool, on Ray."""
+
+    def __init__(self, study: Study, jobs: int, given_cases: int | None):
+        """Raises SimError without Ray."""
+        try:
+            import ray
+        except ImportError:
+            raise SimError("`--engine ray` needs the Python package `ray`: python3 -m pip install ray") from None
+        if not ray.is_initialized():
+            local = {} if "RAY_ADDRESS" in os.environ else {"num_cpus": jobs, "_node_ip_address": "127.0.0.1"}
+            ray.init(include_dashboard=False, log_to_driver=False, logging_level="ERROR", **local)
+        self.ray: Any = ray
+        self.study, self.jobs, self.given_cases = study, jobs, given_cases
         self.kind = ray.remote(_Actor)
-        #: Portions to fly again, and how often each case of them was lost.
-        self.again: list[list[int]] = []
-        self.lost: dict[int, int] = {}
-        #: By the result that is awaited: the worker, its cases, and when it got them.
-        self.flying: dict[Any, tuple[Any, list[int], float]] = {}
+        self.flights: Iterator[Flight] = iter(())
+        #: Workers without work.
+        self.idle: list[Any] = []
+        #: Portions to fly again, and how often each flight of them was lost.
+        self.again: list[list[Flight]] = []
+        self.lost: dict[Flight, int] = {}
+        #: By the result that is awaited: the worker, its flights, and when it got them.
+        self.flying: dict[Any, tuple[Any, list[Flight], float]] = {}
 
-    def fly(self, jobs: int, progress: Callable[[], None]) -> Iterator[Outcome]:
-        for _ in range(jobs):
-            self._hand_out(None)
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.ray.shutdown()
+
+    def fly(self, flights: Iterable[Flight], progress: Callable[[], None]) -> Iterator[tuple[Flight, Outcome]]:
+        """As engine.py says."""
+        self.flights = iter(flights)
+        idle, self.idle = self.idle, []
+        for number in range(self.jobs):
+            self._hand_out(idle[number] if number < len(idle) else None)
         while self.flying:
             progress()
             done, _ = self.ray.wait(list(self.flying), timeout=0.5)
@@ -71,12 +78,15 @@ class _Cluster:
                 yield from self._check_time(result)
 
     def _hand_out(self, actor: Any) -> None:
-        portion = self.again.pop() if self.again else list(islice(self.cases, _PORTION))
+        portion = self.again.pop() if self.again else list(islice(self.flights, _PORTION))
         if portion:
-            actor = actor or self.kind.remote(str(self.study.path.resolve()), self.given_cases)
+            given = self.study.config.plan.parameters
+            actor = actor or self.kind.remote(str(self.study.path.resolve()), self.given_cases, given)
             self.flying[actor.fly.remote(portion)] = actor, portion, time.monotonic()
+        elif actor:
+            self.idle.append(actor)
 
-    def _take(self, result: Any) -> Iterator[Outcome]:
+    def _take(self, result: Any) -> Iterator[tuple[Flight, Outcome]]:
         actor, portion, _ = self.flying.pop(result)
         try:
             outcomes = self.ray.get(result)
@@ -86,26 +96,27 @@ class _Cluster:
             return
         except self.ray.exceptions.RayTaskError as error:
             raise SimError(f"a Ray worker cannot fly the study: {error.cause}") from None
-        yield from outcomes
+        yield from zip(portion, outcomes, strict=True)
         self._hand_out(actor)
 
-    def _check_time(self, result: Any) -> Iterator[Outcome]:
+    def _check_time(self, result: Any) -> Iterator[tuple[Flight, Outcome]]:
         actor, portion, since = self.flying[result]
         if time.monotonic() - since < self.study.timeout_s * len(portion):
             return
         del self.flying[result]
         self.ray.kill(actor)
         if len(portion) == 1:
-            yield not_flown(self.study, portion[0], f"no result within {self.study.timeout_s:g} s (`timeout_s`)")
+            why = f"no result within {self.study.timeout_s:g} s (`timeout_s`)"
+            yield portion[0], not_flown(self.study, portion[0].case, why)
         else:
-            self.again += [[case] for case in portion]
+            self.again += [[flight] for flight in portion]
         self._hand_out(None)
 
-    def _lose(self, portion: list[int], why: str) -> Iterator[Outcome]:
-        """Cases are flown again by themselves; one that has lost several workers is what ends them."""
-        for case in portion:
-            self.lost[case] = self.lost.get(case, 0) + 1
-            if len(portion) == 1 and self.lost[case] >= _TRIES:
-                yield not_flown(self.study, case, why)
+    def _lose(self, portion: list[Flight], why: str) -> Iterator[tuple[Flight, Outcome]]:
+        """Flights are flown again by themselves; one that has lost several workers is what ends them."""
+        for flight in portion:
+            self.lost[flight] = self.lost.get(flight, 0) + 1
+            if len(portion) == 1 and self.lost[flight] >= _TRIES:
+                yield flight, not_flown(self.study, flight.case, why)
             else:
-                self.again.append([case])
+                self.again.append([flight])

@@ -8,7 +8,7 @@ flight itself is not, unless what it reads is written as a metric is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,6 +41,17 @@ class Requirement:
 
 
 @dataclass(frozen=True)
+class JudgedLine:
+    """In each case: `holds` (None: the metrics do not say), `margins` and `sizes` (that of both sides) of a comparison of numbers."""
+
+    text: str
+    unit: str = ""
+    holds: Array | None = None
+    margins: Array | None = None
+    sizes: Array | None = None
+
+
+@dataclass(frozen=True)
 class Limit:
     """`text`: `< 2.0`."""
 
@@ -53,9 +64,8 @@ def requirements(results: Results) -> list[Requirement]:
     error."""
     study = results.study
     flown = ~results.of("error")
-    metrics = {name: _typed(metric, results.metric(name)) for name, metric in study.metrics.items()}
-    passes = study.passes
-    found = [_judged(line, study, passes, metrics, flown) for line in _lines(passes.root)] if passes else []
+    numbers = {name: results.metric(name) for name in study.metrics}
+    found = [_summed(line, flown) for line in judge_lines(study, numbers, study.cases)]
     for verdict in study.required.values():
         if not verdict.assumed:
             violations = results.metric(f"requirement.{verdict.id}")
@@ -100,31 +110,44 @@ def _lines(node: Node) -> Iterator[Node]:
         yield node
 
 
-def _judged(line: Node, study: Study, passes: Metric, metrics: dict[str, Array], flown: Array) -> Requirement:
-    unit = ""
-    margins: Array | None = None
-    sides = [_values(part, study, passes, metrics, len(flown)) for part in line.parts]
+def judge_lines(study: Study, numbers: Mapping[str, Array], cases: int) -> list[JudgedLine]:
+    """Each line of `pass`. numbers: the columns of the study over the cases."""
+    passes = study.passes
+    if passes is None:
+        return []
+    metrics = {name: _typed(metric, numbers[name]) for name, metric in study.metrics.items()}
+    return [_judged(line, study, passes, metrics, cases) for line in _lines(passes.root)]
+
+
+def _judged(line: Node, study: Study, passes: Metric, metrics: dict[str, Array], cases: int) -> JudgedLine:
+    sides = [_values(part, study, passes, metrics, cases) for part in line.parts]
     if line.operator == "compare" and sides[0] is not None and sides[1] is not None:
         left, right = sides[0], sides[1]
         compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal}
         (operator,) = line.value
         holds = left != right if operator == "!=" else compare[operator](left, right)
-        if left.dtype.kind in "fi" and right.dtype.kind in "fi" and operator != "!=":
-            distance = right - left if operator in ("<", "<=") else left - right
-            margins = -np.abs(distance) if operator == "==" else distance
-            names = (_metric_of(part.parts[0] if part.operator == "abs" else part, study) for part in line.parts)
-            unit = next((study.metrics[name].unit for name in names if name), "")
-    else:
-        found = _values(line, study, passes, metrics, len(flown))
-        if found is None:
-            return Requirement(line.text)
-        holds = found.astype(bool)
-    failed = flown & ~holds
+        if left.dtype.kind not in "fi" or right.dtype.kind not in "fi" or operator == "!=":
+            return JudgedLine(line.text, holds=holds)
+        distance = right - left if operator in ("<", "<=") else left - right
+        names = (_metric_of(part.parts[0] if part.operator == "abs" else part, study) for part in line.parts)
+        unit = next((study.metrics[name].unit for name in names if name), "")
+        margins = -np.abs(distance) if operator == "==" else distance
+        return JudgedLine(line.text, unit, holds, margins, np.abs(left) + np.abs(right))
+    found = _values(line, study, passes, metrics, cases)
+    return JudgedLine(line.text, holds=None if found is None else found.astype(bool))
+
+
+def _summed(line: JudgedLine, flown: Array) -> Requirement:
+    """flown: which cases have ended without an error."""
+    if line.holds is None:
+        return Requirement(line.text)
+    failed = flown & ~line.holds
     among = failed if failed.any() else flown
-    if margins is not None and np.isfinite(margins[among]).any():
-        case = int(np.nanargmin(np.where(among & np.isfinite(margins), margins, np.nan)))
-        return Requirement(line.text, unit, int(failed.sum()), float(margins[case]), case)
-    return Requirement(line.text, unit, int(failed.sum()), None, int(np.argmax(failed)) if failed.any() else None)
+    if line.margins is not None and np.isfinite(line.margins[among]).any():
+        case = int(np.nanargmin(np.where(among & np.isfinite(line.margins), line.margins, np.nan)))
+        return Requirement(line.text, line.unit, int(failed.sum()), float(line.margins[case]), case)
+    case_of = int(np.argmax(failed)) if failed.any() else None
+    return Requirement(line.text, line.unit, int(failed.sum()), None, case_of)
 
 
 def _values(node: Node, study: Study, passes: Metric, metrics: dict[str, Array], cases: int) -> Array | None:

@@ -15,6 +15,7 @@ from fcsl_compiler.api.files import SourceError
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode, SourcePathError, parse_json, resolve_source
 from fcsl_compiler.api.types import Scalar, scalar_of, shape_of
 from simclient.descriptor import Machine
+from simclient.parameters import Given
 from simclient.requirements import Verdict
 
 from ..config import SimConfig, load
@@ -37,6 +38,7 @@ from .dispersion import (
     random_bits,
 )
 from .metric import RESERVED, Metric, MetricError
+from .tune_block import Tune, read_tune
 
 MAX_CASES = 10_000_000
 #: Of the table, beside those of parameters and metrics.
@@ -65,7 +67,7 @@ class Dispersed:
 @dataclass(frozen=True)
 class Study:
     """`metrics` by name; `passes` is None where every flight that ends has passed. `required`: the requirements of the machine,
-    by id, before a flight. `fingerprint` is of all that decides what the cases give."""
+    by id, before a flight. `tune`: what `fcsl tune` does with it. `fingerprint` is of all that decides what the cases give."""
 
     path: Path
     config: SimConfig
@@ -76,6 +78,7 @@ class Study:
     metrics: dict[str, Metric]
     passes: Metric | None
     required: dict[str, Verdict]
+    tune: Tune | None
     timeout_s: float
     fingerprint: str
 
@@ -87,6 +90,12 @@ class Study:
     def columns(self) -> list[str]:
         """The numbers of a case: metrics, and for each requirement how often it was violated; NaN: not exercised."""
         return [*self.metrics, *(f"requirement.{id_}" for id_ in self.required)]
+
+    @property
+    def parameter_file(self) -> str:
+        """That with which the controllers begin; empty: none."""
+        given = self.config.plan.parameters
+        return given.name if given else ""
 
     def seed_of(self, case: int) -> int:
         """Of the simulation's noise."""
@@ -101,7 +110,8 @@ class Study:
         if case is None:
             return ""
         cases = f" --cases {self.cases}" if isinstance(self.design, Random | LatinHypercube) else ""
-        return f"fcsl campaign {shlex.quote(str(self.path))}{cases} --case {case} --record case_{case}"
+        given = f" --parameters {shlex.quote(self.parameter_file)}" if self.parameter_file else ""
+        return f"fcsl campaign {shlex.quote(str(self.path))}{cases}{given} --case {case} --record case_{case}"
 
     def expressions(self) -> list[Metric]:
         return [*self.metrics.values(), *([self.passes] if self.passes else [])]
@@ -114,9 +124,9 @@ class Study:
         return any(metric.all_ticks for metric in self.expressions())
 
 
-def read_study(path: Path, cases: int | None = None) -> Study:
-    """Reads and checks the file; compiles models and machine. cases: in place of the file's. Raises DiagnosticError with all
-    errors of the file, or SimError."""
+def read_study(path: Path, cases: int | None = None, parameters: Given | None = None) -> Study:
+    """Reads and checks the file; compiles models and machine. cases: in place of the file's. parameters: with which the
+    controllers begin. Raises DiagnosticError with all errors of the file, or SimError."""
     try:
         source = SourceFile.read(path, str(path))
     except SourceError as error:
@@ -129,16 +139,16 @@ def read_study(path: Path, cases: int | None = None) -> Study:
         raise SimError(
             f"{path}: this is a simulation, not a study; `fcsl sim {path}` flies it; `fcsl schema study` has a study's keys"
         )
-    return _Reader(path, sink).read(root, source.text, cases)
+    return _Reader(path, sink, parameters).read(root, source.text, cases)
 
 
 class _Reader:
-    def __init__(self, path: Path, sink: DiagnosticSink):
-        self.path, self.sink = path, sink
+    def __init__(self, path: Path, sink: DiagnosticSink, parameters: Given | None):
+        self.path, self.sink, self.parameters = path, sink, parameters
         self.reader = ConfigReader(sink)
 
     def read(self, root: JsonNode, text: str, cases: int | None) -> Study:
-        optional = ("cases", "parameters", "metrics", "pass", "duration", "timeout_s", *_FOR_READERS)
+        optional = ("cases", "parameters", "metrics", "pass", "duration", "timeout_s", "tune", *_FOR_READERS)
         keys = self.reader.object(root, "a study", ("simulation", "seed", "design"), optional)
         self.sink.raise_if_failed()
         assert keys is not None
@@ -153,6 +163,7 @@ class _Reader:
         try:
             metrics = self._metrics(keys.get("metrics"), run.machine)
             passes = self._expression(keys.get("pass"), "`pass`", run.machine, metrics, condition=True)
+            tune = self._tune(keys, config, parameters, metrics, run.machine)
             machine = run.machine
             required = {verdict.id: verdict for verdict in run.verdicts()}
         finally:
@@ -166,7 +177,7 @@ class _Reader:
         for library in sorted(libraries):
             print_of.update(library.read_bytes())
         return Study(
-            *(self.path, config, machine, seed, parameters, design, metrics, passes, required, timeout_s),
+            *(self.path, config, machine, seed, parameters, design, metrics, passes, required, tune, timeout_s),
             print_of.hexdigest(),
         )
 
@@ -180,7 +191,8 @@ class _Reader:
             file = resolve_source(text, config=self.path) if text.startswith("package://") else self.path.parent / text
         except SourcePathError as error:
             raise SimError(f"{text}: {error}") from None
-        return load(file, duration_s=None if duration is None else Fraction(repr(duration)))
+        duration_s = None if duration is None else Fraction(repr(duration))
+        return load(file, duration_s=duration_s, parameters=self.parameters)
 
     # ---- what is dispersed ------------------------------------------------------------------------------------------
 
@@ -406,6 +418,22 @@ class _Reader:
             if metric is not None:
                 found[name] = metric
         return found
+
+    def _tune(
+        self,
+        keys: dict[str, JsonNode],
+        config: SimConfig,
+        parameters: Sequence[Dispersed],
+        metrics: Mapping[str, Metric],
+        machine: Machine,
+    ) -> Tune | None:
+        if "tune" not in keys:
+            return None
+        given = keys.get("cases")
+        cases = int(given.value) if given and given.kind == "int" and isinstance(given.value, int) else None
+        controllers = controller_parameters(config.machines)
+        dispersed = {p.path: p.target for p in parameters}
+        return read_tune(keys["tune"], self.reader, controllers, dispersed, metrics, machine, cases)
 
     def _expression(
         self, node: JsonNode | None, what: str, machine: Machine, metrics: Mapping[str, Metric], condition: bool = False

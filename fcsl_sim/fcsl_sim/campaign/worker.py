@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A process that flies cases: reads lines `FIRST COUNT` from standard input and writes an outcome per case, as a line of JSON,
-to the file descriptor that it is given.
+"""A process that flies cases: reads lines `[FIRST, COUNT, GAINS]` from standard input and writes an outcome per case, as a line
+of JSON, to the file descriptor that it is given.
 
-    python3 -m fcsl_sim.campaign.worker STUDY CASES DESCRIPTOR
+    python3 -m fcsl_sim.campaign.worker STUDY CASES PARAMETERS DESCRIPTOR
 """
 
 from __future__ import annotations
@@ -39,22 +39,22 @@ def outcome_of(line: str) -> Outcome:
     return Outcome(case, seed, tuple(values), verdict, end, ticks, digest, tuple(metrics), error, failed_by)
 
 
-def main(study: str, cases: str, descriptor: str) -> int:
+def main(study: str, cases: str, parameters: str, descriptor: str) -> int:
     # A model that hangs must not outlive the campaign; Ctrl-C is the campaign's.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        flights = Flights.of(Path(study), None if cases == "-" else int(cases))
+        flights = Flights.of(Path(study), None if cases == "-" else int(cases), parameters or None)
     except (DiagnosticError, SimError, TwinError, OSError) as error:
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
         return 2
     with os.fdopen(int(descriptor), "w") as out:
         print(READY, file=out, flush=True)
         for line in sys.stdin:
-            first, count = map(int, line.split())
+            first, count, gains = json.loads(line)
             written = time.monotonic()
             for case in range(first, first + count):
-                print(line_of(flights.fly(case)), file=out)
+                print(line_of(flights.fly(case, gains=gains)), file=out)
                 if (now := time.monotonic()) > written + _HOLD_S:
                     written = now
                     out.flush()

@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from tempfile import TemporaryFile
 from typing import IO
 
 from ..errors import SimError
-from .flight import CRASHED, Outcome, not_flown
+from .flight import CRASHED, Flight, Outcome, not_flown
 from .study import Study
 from .worker import READY, outcome_of
 
@@ -36,52 +37,56 @@ class _Worker:
     text: bytes = b""
     ready: bool = False
     alone: bool = False  # the last portion is one case
-    cases: list[int] = field(default_factory=list)  # handed out, without a result yet
+    flights: list[Flight] = field(default_factory=list)  # handed out, without a result yet
     since: float = field(default_factory=time.monotonic)  # the case in flight began, or the process
 
 
-def fly_in_processes(
-    study: Study, cases: Iterator[int], jobs: int, given_cases: int | None, progress: Callable[[], None]
-) -> Iterator[Outcome]:
-    """The outcomes of the cases, as they come. `progress` is called at least twice a second. Closing it ends the processes.
-    Raises SimError if no process can be started."""
-    pool = _Pool(study, cases, given_cases)
-    try:
-        yield from pool.fly(jobs, progress)
-    finally:
-        pool.close()
+class Pool:
+    """Processes that wait for flights. A context manager: its end is theirs."""
 
-
-class _Pool:
-    def __init__(self, study: Study, cases: Iterator[int], given_cases: int | None):
-        self.study, self.cases, self.given_cases = study, cases, given_cases
+    def __init__(self, study: Study, jobs: int, given_cases: int | None):
+        self.study, self.jobs, self.given_cases = study, jobs, given_cases
         self.selector = selectors.DefaultSelector()
         self.workers: list[_Worker] = []
         self.portion = 1
-        self.pending: list[int] = []  # taken from `cases`, not handed out
-        self.alone: list[int] = []  # to be flown one by one: one of them has ended a process
+        self.flights: Iterator[Flight] | None = None  # None: all are handed out
+        self.pending: list[Flight] = []  # taken from `flights`, not handed out
+        self.alone: list[Flight] = []  # to be flown one by one: one of them has ended a process
 
-    def fly(self, jobs: int, progress: Callable[[], None]) -> Iterator[Outcome]:
-        for _ in range(jobs):
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for worker in list(self.workers):
+            if worker.flights or not worker.ready:
+                worker.process.kill()
+            self._forget(worker)
+        self.selector.close()
+
+    def fly(self, flights: Iterable[Flight], progress: Callable[[], None]) -> Iterator[tuple[Flight, Outcome]]:
+        """As engine.py says."""
+        self.flights = iter(flights)
+        for worker in self.workers:
+            if worker.ready:
+                self._hand_out(worker)
+        while len(self.workers) < self.jobs:
             self._start()
-        while self.workers:
+        while self.flights or self.pending or self.alone or any(worker.flights for worker in self.workers):
             progress()
+            if not self.workers:
+                self._start()
             for key, _ in self.selector.select(timeout=0.5):
                 yield from self._read(key.data)
             for worker in list(self.workers):
                 yield from self._check_time(worker)
-
-    def close(self) -> None:
-        for worker in list(self.workers):
-            worker.process.kill()
-            self._forget(worker)
 
     # ---- processes --------------------------------------------------------------------------------------------------
 
     def _start(self) -> None:
         results, theirs = os.pipe()
         cases = "-" if self.given_cases is None else str(self.given_cases)
-        line = [sys.executable, "-m", "fcsl_sim.campaign.worker", str(self.study.path), cases, str(theirs)]
+        study = str(self.study.path), cases, self.study.parameter_file
+        line = [sys.executable, "-m", "fcsl_sim.campaign.worker", *study, str(theirs)]
         words = TemporaryFile()  # a pipe would fill, and a model that prints much would wait for ever
         try:
             process = subprocess.Popen(
@@ -110,38 +115,44 @@ class _Pool:
         with worker.words:
             return worker.words.read(_WORDS_BYTES)
 
-    # ---- cases --------------------------------------------------------------------------------------------------------
+    # ---- flights --------------------------------------------------------------------------------------------------------
 
     def _hand_out(self, worker: _Worker) -> None:
-        """The next portion, before the last one is flown; or the end of the work."""
-        if worker.cases and (self.alone or worker.alone or len(worker.cases) > self.portion // 2):
+        """The next portion, before the last one is flown."""
+        if worker.flights and (self.alone or worker.alone or len(worker.flights) > self.portion // 2):
             return
         portion = [self.alone.pop()] if self.alone else self._next_portion()
+        if not portion:
+            return
         worker.alone = len(portion) == 1
         assert worker.process.stdin
         with suppress(BrokenPipeError):  # it has crashed: its pipe of results ends, too
-            if portion:
-                worker.since = worker.since if worker.cases else time.monotonic()
-                worker.cases += portion
-                worker.process.stdin.write(f"{portion[0]} {len(portion)}\n".encode())
-                worker.process.stdin.flush()
-            elif not worker.cases:
-                worker.process.stdin.close()
+            worker.since = worker.since if worker.flights else time.monotonic()
+            worker.flights += portion
+            line = json.dumps([portion[0].case, len(portion), portion[0].gains])
+            worker.process.stdin.write(f"{line}\n".encode())
+            worker.process.stdin.flush()
 
-    def _next_portion(self) -> list[int]:
-        """Cases in a row."""
-        found: list[int] = []
+    def _next_portion(self) -> list[Flight]:
+        """Cases in a row, with the same gains."""
+        found: list[Flight] = []
         while len(found) < self.portion:
-            case = self.pending.pop() if self.pending else next(self.cases, None)
-            if case is None:
+            flight = self.pending.pop() if self.pending else self._next()
+            if flight is None:
                 break
-            if found and case != found[-1] + 1:
-                self.pending.append(case)
+            if found and flight != Flight(found[-1].case + 1, found[-1].gains):
+                self.pending.append(flight)
                 break
-            found.append(case)
+            found.append(flight)
         return found
 
-    def _read(self, worker: _Worker) -> Iterator[Outcome]:
+    def _next(self) -> Flight | None:
+        flight = next(self.flights, None) if self.flights else None
+        if flight is None:
+            self.flights = None
+        return flight
+
+    def _read(self, worker: _Worker) -> Iterator[tuple[Flight, Outcome]]:
         data = os.read(worker.results, _READ_BYTES)
         if not data:
             yield from self._ended(worker)
@@ -155,10 +166,9 @@ class _Pool:
                 self._hand_out(worker)
                 continue
             outcome = outcome_of(line.decode())
-            assert worker.cases and worker.cases[0] == outcome.case
-            worker.cases.pop(0)
+            assert worker.flights and worker.flights[0].case == outcome.case
             done += 1
-            yield outcome
+            yield worker.flights.pop(0), outcome
         if done:
             self._adapt((now - worker.since) / done)
             worker.since = now
@@ -168,18 +178,18 @@ class _Pool:
         wanted = int(_PORTION_S / max(took_s, 1e-6))
         self.portion = max(1, min(_MAX_PORTION, wanted, 2 * self.portion))
 
-    def _ended(self, worker: _Worker) -> Iterator[Outcome]:
+    def _ended(self, worker: _Worker) -> Iterator[tuple[Flight, Outcome]]:
         words = self._forget(worker).decode("utf-8", "replace").strip()
         if not worker.ready:
             raise SimError(
                 words.removeprefix("fcsl-sim: error: ") or "a process for flights ended before its first one"
             )
-        if worker.cases:
+        if worker.flights:
             yield from self._lost(worker, CRASHED)
 
-    def _check_time(self, worker: _Worker) -> Iterator[Outcome]:
+    def _check_time(self, worker: _Worker) -> Iterator[tuple[Flight, Outcome]]:
         limit = self.study.timeout_s if worker.ready else _START_S
-        if time.monotonic() - worker.since < limit or (worker.ready and not worker.cases):
+        if time.monotonic() - worker.since < limit or (worker.ready and not worker.flights):
             return
         worker.process.kill()
         self._forget(worker)
@@ -187,10 +197,10 @@ class _Pool:
             raise SimError(f"a process for flights is not ready after {_START_S:g} s")
         yield from self._lost(worker, f"no result within {limit:g} s (`timeout_s`)")
 
-    def _lost(self, worker: _Worker, why: str) -> Iterator[Outcome]:
+    def _lost(self, worker: _Worker, why: str) -> Iterator[tuple[Flight, Outcome]]:
         """A case by itself is what ended the process. Others are flown one by one to find it."""
         self._start()
-        if len(worker.cases) == 1:
-            yield not_flown(self.study, worker.cases[0], why)
+        if len(worker.flights) == 1:
+            yield worker.flights[0], not_flown(self.study, worker.flights[0].case, why)
         else:
-            self.alone += reversed(worker.cases)
+            self.alone += reversed(worker.flights)
