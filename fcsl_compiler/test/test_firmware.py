@@ -171,6 +171,28 @@ def test_externs_in_c_are_compiled_too(tmp_path: Path) -> None:
     )
 
 
+def test_it_keeps_the_table_of_fields_of_instances_that_are_alike(tmp_path: Path) -> None:
+    """Hosts make it when they open a machine; a project has no memory for it."""
+    names = [f"count{n}" for n in range(80)]
+    text = """class Count:
+    outputs = {"runs": "i64"}
+
+    def execute(self):
+        self.runs += 1
+"""
+    config = {
+        "tick_hz": 10,
+        "initial_state": "A",
+        "instances": {name: {"algorithm": "Count"} for name in names},
+        "states": {"A": {"schedule": dict.fromkeys(names, 10)}},
+    }
+    many = write_machine(tmp_path, "many", config, {"count": text})
+    build(many, tmp_path / "out")
+    assert main(["build", str(many), "-o", str(tmp_path / "host")]) == 0
+    assert ".folded = " not in (tmp_path / "out/many.c").read_text()
+    assert ".folded = " in (tmp_path / "host/many.c").read_text()
+
+
 @pytest.mark.parametrize(
     ("processor", "words"),
     [
