@@ -74,3 +74,12 @@ def test_a_value_out_of_its_bounds_is_refused(
     with pytest.raises(HttpError) as caught:
         arguments_of(KINDS[kind], {option: value}, Root(tmp_path))
     assert caught.value.status == 400 and f"option {option!r}: expected {expected}" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_parameter_file_lies_below_the_root(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "tuned.yaml").write_text("")
+    arguments = arguments_of(KINDS[kind], {"parameters": "tuned.yaml"}, Root(tmp_path))
+    assert arguments == [f"--parameters={tmp_path.resolve()}/tuned.yaml"]
+    with pytest.raises(HttpError):
+        arguments_of(KINDS[kind], {"parameters": "../tuned.yaml"}, Root(tmp_path))

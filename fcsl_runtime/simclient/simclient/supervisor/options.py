@@ -119,6 +119,7 @@ _COMMON: Mapping[str, Reader] = {
     "namespace": _text(_NAMESPACE),
     "telemetry_every": _every,
     "telemetry_fields": _text(_GLOBS),
+    "parameters": _file(""),
 }
 
 
