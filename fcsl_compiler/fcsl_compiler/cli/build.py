@@ -139,9 +139,12 @@ def machine_files(compilation: Compilation) -> list[Path]:
     """The machine JSON and all files that it is made from."""
     from ..parse.machine_texts import read_texts
     from ..parse.source_path import resolve_source
+    from ..ros.channels import definitions_used
+    from ..ros.interfaces import definition_files
 
     texts = read_texts(compilation.path)
     own = (source.name for source in compilation.checked.sources if source not in compilation.checked.made_sources)
     names = [*own, *(texts.files if texts is not None else ())]
     files = [resolve_source(name, config=compilation.path).resolve() for name in dict.fromkeys(names)]
-    return [compilation.path.resolve(), *files]
+    definitions = definition_files(definitions_used(compilation.checked.channels), compilation.path)
+    return [compilation.path.resolve(), *files, *(path.resolve() for path in definitions)]

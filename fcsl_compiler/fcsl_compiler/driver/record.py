@@ -42,9 +42,15 @@ def _sha256(record: dict[str, Any]) -> str:
 
 def _machine(c: Compilation) -> dict[str, Any]:
     """Digests of the sources as they were compiled, not of the current files."""
+    from ..ros.channels import definitions_used
+    from ..ros.interfaces import stored_path
+
     assert c.parsed is not None
     sources = [c.parsed.source, *(file.source for file in c.parsed.files), *(r.span.source for r in c.effects)]
     files = {str(Path(s.path).resolve()): digest(s.text) for s in sources}
+    stored = stored_path(c.path)
+    if definitions_used(c.checked.channels) and stored.is_file():
+        files[str(stored.resolve())] = digest(_text(stored))
     linked = [(path, path.read_bytes()) for path in c.target.archives]
     linked += [(file.path, file.content) for file in c.c_inputs.files if file.content is not None]
     externs = {str(path.resolve()): digest(content) for path, content in linked}
@@ -92,6 +98,8 @@ def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
 
 
 def _kind(path: str, config: str) -> str:
+    if path.endswith(".interfaces.json"):
+        return "definitions"
     return "machine" if path == config else "algorithm" if path.endswith(".py") else "requirements"
 
 

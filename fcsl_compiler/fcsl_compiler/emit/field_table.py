@@ -14,7 +14,7 @@ from ..model.c_names import c_name
 from ..model.machine import Channel, Instance, Machine
 from ..model.ranges import UNBOUNDED, Range
 from ..model.types import Scalar, count_of, leaves, scalar_of, shape_of
-from ..ros.channels import definition_texts
+from ..ros.channels import definitions_used
 from .names import channel_member, instance_member, leaf_member, sensors
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
@@ -230,5 +230,5 @@ def source_hash(machine: Machine) -> str:
     messages that are not standard, and over the instances of a subset machine."""
     texts = [machine.config.name, machine.hashed_text]
     texts += [part for source in machine.sources for part in (source.name, source.text)]
-    texts += definition_texts(machine.channels)
+    texts += [part for name, lines in definitions_used(machine.channels).items() for part in (name, *lines)]
     return digest(*texts, *(("subset", *machine.subset) if machine.subset else ()))

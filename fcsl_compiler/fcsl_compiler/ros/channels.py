@@ -66,12 +66,12 @@ def interfaces_of(ros: RosMapping) -> Interfaces:
     return STANDARD_INTERFACES if ros.interfaces is None else ros.interfaces
 
 
-def definition_texts(channels: Iterable[Channel]) -> list[str]:
-    """The definitions that the messages of channels consist of and that are not standard, as texts that can be hashed."""
+def definitions_used(channels: Iterable[Channel]) -> dict[str, Sequence[str]]:
+    """The definitions that the messages of channels consist of and that are not standard, by full name."""
     texts: dict[str, Sequence[str]] = {}
     for channel in channels:
         texts |= interfaces_of(channel.ros).texts
-    return [part for name in sorted(texts) for part in (name, *texts[name])]
+    return {name: texts[name] for name in sorted(texts)}
 
 
 def payload_of(channel: Channel) -> Message:

@@ -14,7 +14,7 @@ _HEADER = "std_msgs/msg/Header"
 #: Limits of a definition; none that is installed comes near them.
 _MAX_MEMBERS, _MAX_COUNT = 4096, 1 << 28
 
-_TYPE = re.compile(r"([A-Za-z]\w*(?:/[A-Za-z]\w*){0,2})(?:<=(\d+))?(\[(<=)?(\d*)\])?", re.ASCII)
+_TYPE = re.compile(r"([A-Za-z]\w*(?:/(?:msg/)?[A-Za-z]\w*)?)(?:<=(\d+))?(\[(<=)?(\d*)\])?", re.ASCII)
 _FIELD = re.compile(r"[a-z](_?[a-z0-9])*")
 _CONSTANT = re.compile(r"[A-Z](_?[A-Z0-9])*")
 _LINE = re.compile(r"(\S+)\s+(\w+)\s*(=?)\s*(.*)", re.ASCII)

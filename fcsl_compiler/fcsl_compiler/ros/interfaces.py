@@ -7,6 +7,7 @@ definition is both stored and installed, they must be equal.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,8 +23,8 @@ from .standard_messages import CONSTANTS, SIZES, STANDARD, Constant, Definitions
 
 #: Most bytes of a message, without its strings and unbounded lists.
 MAX_BYTES = 65536
-#: Messages within one another.
-_MAX_DEPTH = 16
+#: Messages within one another, and fields of all of them.
+_MAX_DEPTH, _MAX_FIELDS = 16, 65536
 _BYTES = ("uint8", "int8", "byte", "char")
 
 #: Definitions as lines that declare, by full name.
@@ -54,6 +55,16 @@ STANDARD_INTERFACES = Interfaces(STANDARD, CONSTANTS)
 def stored_path(config: Path) -> Path:
     """Where the definitions of a machine's messages are stored."""
     return config.with_suffix(".interfaces.json")
+
+
+def definition_files(messages: Iterable[str], config: Path) -> list[Path]:
+    """The files that have the definitions of these messages (full names), which are not standard: stored and installed."""
+    found = [stored_path(config)] if (names := list(messages)) else []
+    for message in names:
+        package, _, name = message.split("/")
+        with contextlib.suppress(PackageNotFound):
+            found.append(package_share(package) / "msg" / f"{name}.msg")
+    return [path for path in found if path.is_file()]
 
 
 def find_interfaces(type_: str, config: Path) -> Interfaces:
@@ -167,16 +178,21 @@ def _read(message: str, texts: Texts) -> Interfaces:
     for name, lines in texts.items():
         definition = _definition(name, lines)
         members[name], constants[name] = definition.members, definition.constants
-    _check_depth(message, members, 0)
+    _fields(message, members, {})
     return Interfaces(members, constants, dict(texts))
 
 
-def _check_depth(message: str, members: Definitions, depth: int) -> None:
+def _fields(message: str, members: Definitions, known: dict[str, int], depth: int = 0) -> int:
+    """The number of fields of a message and of all in it. Raises InterfaceError where they would be too many to look at."""
     if depth > _MAX_DEPTH:
         raise InterfaceError(f"`{short_name(message)}` contains itself, or is nested too deeply", "map another message")
-    for member in members[message]:
-        if "/" in member.type:
-            _check_depth(member.type, members, depth + 1)
+    if message not in known:
+        known[message] = sum(
+            _fields(member.type, members, known, depth + 1) if "/" in member.type else 1 for member in members[message]
+        )
+    if known[message] > _MAX_FIELDS:
+        raise InterfaceError(f"`{short_name(message)}` has more than {_MAX_FIELDS} fields", "map another message")
+    return known[message]
 
 
 def _check(message: str, found: Interfaces) -> None:

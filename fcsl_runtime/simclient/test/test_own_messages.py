@@ -307,11 +307,37 @@ def source_hash(config: Path) -> str:
         ("wstring a\nint32 b\n", "a wstring"),
         ("float64[9000] a\n", "has 144017 bytes; channels carry 65536"),
         ("}{\n", "not a type and a name"),
+        ("std_msgs/srv/Empty a\n", "not a type and a name"),
+        ("\0\xff\n", "not a type and a name"),
     ],
 )
 def test_definitions_that_are_refused(config: Path, text: str, reason: str) -> None:
     folder = config.parents[1] / "ws/share/rover_msgs/msg"
     (folder / "Wheel.msg").write_text(text)
+    found = errors(config)
+    assert "E236" in found and reason in found
+
+
+def test_a_definition_that_grows_without_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = {f"deep_msgs/msg/L{i}": "".join(f"L{i + 1} m{j}\n" for j in range(20)) for i in range(15)}
+    source(monkeypatch, install(tmp_path / "ws", own | {"deep_msgs/msg/L15": "int8 x\n"}))
+    row = channels()[0]
+    row["ros"] = {"type": "deep_msgs/L0", "field": "m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.m0.x"}
+    assert "has more than 65536 fields" in errors(write(tmp_path / "machine", [row]))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("{", "cannot be read"),
+        ("[1]", "is not what `fcsl interfaces` writes"),
+        ('{"rover_msgs/Status": 3}', "is not what `fcsl interfaces` writes"),
+        ('{"rover_msgs/Status": ["int32"]}', "the definition of `rover_msgs/Status` is not valid"),
+        ('{"rover_msgs/Status": ["Wheel wheel"]}', "does not have `rover_msgs/Wheel`"),
+    ],
+)
+def test_stored_files_that_are_refused(config: Path, text: str, reason: str) -> None:
+    config.with_suffix(".interfaces.json").write_text(text)
     found = errors(config)
     assert "E236" in found and reason in found
 
@@ -377,3 +403,22 @@ def test_a_bag_is_replayed_as_its_messages_are_taken_in_flight(config: Path, tmp
     assert columns(tmp_path / "out", "drive.inputs.ranges")[1].tolist()[-1][:3] == [1.0, 3.0, 0.0]
     assert columns(tmp_path / "out", "drive.inputs.phase")[1].tolist() == [1, 1]
     assert columns(tmp_path / "out", "drive.inputs.left_id")[1].tolist() == [0, 2]
+
+
+def test_a_build_system_builds_again_when_a_definition_changes(config: Path, tmp_path: Path) -> None:
+    assert main(["interfaces", str(config)]) == 0
+    depfile = tmp_path / "rover.d"
+    assert main(["build", "--c-only", str(config), "-o", str(tmp_path / "c"), "--depfile", str(depfile)]) == 0
+    folder = config.parents[1] / "ws/share/rover_msgs/msg"
+    needs = {*map(str, (config.with_suffix(".interfaces.json"), folder / "Wheel.msg", folder / "Status.msg"))}
+    assert needs <= set(depfile.read_text().split()) and str(folder / "Picture.msg") not in depfile.read_text()
+
+
+def test_a_library_is_older_than_its_definitions(config: Path, tmp_path: Path) -> None:
+    assert main(["interfaces", str(config)]) == 0
+    assert main(["build", str(config), "-o", str(tmp_path / "out")]) == 0
+    open_run(tmp_path / "out/librover.so", "rover").close()
+    stored = config.with_suffix(".interfaces.json")
+    stored.write_text(stored.read_text().replace("int32 id", "int64 id"))
+    with pytest.raises(TwinError, match=r"definitions .*rover\.interfaces\.json has changed"):
+        open_run(tmp_path / "out/librover.so", "rover")
