@@ -412,6 +412,8 @@ def test_a_library_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
         ("--record-policy never --record b", 2, "wait or drop, not never"),
         ("--record-policy drop", 2, "need --record"),
         ("--record-fields *", 2, "need --record"),
+        ("--record-split seconds=1", 2, "need --record"),
+        ("--record-split hours=1 --record b", 1, "split by seconds=60"),
         ("--summary /nonexistent/folder/end", 1, "cannot write '/nonexistent/folder/end': No such file"),
         ("--summary /", 1, "'/' is no name of a file to write"),
         ("--summary=", 1, "'' is no name of a file to write"),

@@ -23,6 +23,7 @@ from test_record_faults import CUT
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
+from simclient.replay.cut import cut
 
 SECONDS = 30
 PILOT = 1
@@ -130,6 +131,9 @@ def test_what_is_around_a_fault_is_kept(tmp_path: Path) -> None:
     (missing,) = verdict.missing
     gap = next(b for a, b in itertools.pairwise(ticks) if b != a + 1)
     assert missing.startswith("ticks ") and f"to {gap - 1} were not verified: no file" in missing
+    cut(opened, tmp_path / "cut", 0, 10**12)
+    (missing,) = replay(tmp_path / "cut", library=FIXTURE).missing
+    assert f"to {gap - 1} were not verified: the bag does not have them" in missing
 
 
 @pytest.mark.parametrize(
@@ -165,13 +169,13 @@ def test_killed_where_two_files_meet(tmp_path: Path) -> None:
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, tmp_path / "cut.c"], check=True)
     code = ENDLESS.format(folder=str(Path(__file__).parent))
     counts = []
-    for cut in range(30, 46):
-        bag = tmp_path / str(cut)
-        environment = {**os.environ, "LD_PRELOAD": str(library), "CUT": str(cut)}
+    for call in range(30, 46):
+        bag = tmp_path / str(call)
+        environment = {**os.environ, "LD_PRELOAD": str(library), "CUT": str(call)}
         done = subprocess.run([sys.executable, "-B", "-c", code, bag], env=environment, timeout=60, check=False)
         assert done.returncode in (9, 10)
         listed = metadata(bag)["relative_file_paths"]
-        assert {file.name for file in bag.glob("*.mcap")} - set(listed) <= {f"{cut}_{len(listed)}.mcap"}
+        assert {file.name for file in bag.glob("*.mcap")} - set(listed) <= {f"{call}_{len(listed)}.mcap"}
         verdict = replay(bag, library=FIXTURE)
         assert verdict.divergence is None, verdict
         assert not [text for text in verdict.missing if "verified" in text]

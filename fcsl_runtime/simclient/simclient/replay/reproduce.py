@@ -161,7 +161,6 @@ class Replay:
         elif self._gap:
             self._resume(checkpoint, self._gap)
         else:
-            self._advance(checkpoint.tick, "a checkpoint")
             self._compare_checkpoint(checkpoint)
 
     def _start(self, checkpoint: Any) -> None:
@@ -202,10 +201,17 @@ class Replay:
             )
 
     def _compare_checkpoint(self, checkpoint: Any) -> None:
+        """Where the bag has nothing of the ticks before it, a difference shows only that more than their records is missing."""
+        begun, behind = self._tick, checkpoint.tick - self._tick
+        self._advance(checkpoint.tick, "a checkpoint")
         found = struct_difference(bytes(checkpoint.data), self._run.save(), self._run.machine)
-        if found is not None:
+        if found is not None and behind:
+            self._tick = begun
+            self._verdict.ticks -= behind
+            self._resume(checkpoint, "the bag does not have them")
+        elif found is not None:
             self._diverged(checkpoint.tick, *found)
-        self._verdict.checkpoints += 1
+        self._verdict.checkpoints += found is None
 
     def _advance(self, tick: int, what: str) -> None:
         """Runs until `tick` ticks are completed."""
