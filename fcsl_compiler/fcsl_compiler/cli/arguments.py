@@ -160,7 +160,9 @@ def _add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         'cortex-m4, or a C compiler and its options, as "arm-none-eabi-gcc -mcpu=cortex-m33 -mthumb"',
     )
     build.add_argument("--strict", action="store_true", help=_STRICT_HELP)
-    build.add_argument("--times", action="store_true", help="let hosts measure the time of each instance (fcsl var top)")
+    build.add_argument(
+        "--times", action="store_true", help="let hosts measure the time of each instance (fcsl var top)"
+    )
     build.add_argument("--dump", choices=DUMPS, help="print the result of a pass, or the types of locals, and stop")
     what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load"
     build.add_argument("--report", action="store_true", help=what)
