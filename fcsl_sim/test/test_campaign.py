@@ -97,6 +97,10 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
     return write_study
 
 
+def correlated(other: str = "gauge.parameters.sigma", is_: float = 0.5) -> dict[str, Any]:
+    return {"correlations": [{"of": ["gauge.parameters.bias", other], "is": is_}]}
+
+
 def table_of(folder: Path | str) -> dict[str, Any]:
     table = pq.read_table(Path(folder) / "cases.parquet")
     return {name: np.array(table[name]) for name in table.column_names}
@@ -123,6 +127,15 @@ def test_a_campaign_from_the_command_line(write: Write, capsys: pytest.CaptureFi
     assert said.out.startswith(f"{passed.sum()} of 40 passed")
     assert (rows["ticks"] == 100).all() and (rows["end"] == "duration").all()
     assert "40 of 40 cases" in said.err
+
+
+def test_correlated_values_in_the_table(write: Write) -> None:
+    main(["campaign", str(write(cases=200, **correlated(is_=-0.8)))])
+    rows = table_of("gauge.campaign")
+    bias, sigma = rows["gauge.parameters.bias"], rows["gauge.parameters.sigma"]
+    wanted = 6.0 / np.pi * np.arcsin(-0.8 / 2.0)
+    assert stats.spearmanr(bias, sigma).statistic == pytest.approx(wanted, abs=0.1)
+    assert sigma.min() >= 0.0 and sigma.max() <= 0.5
 
 
 def test_one_case_again(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
@@ -706,6 +719,12 @@ def test_a_power_has_the_digits_of_a_double(write: Write) -> None:
         ({"metrics": {"m": "gauge.outputs.value and true"}}, "E208: metric `m`: `gauge.outputs.value` is a number, neither"),
         ({"simulation": 3}, "E208: `simulation` is a string"),
         ({"sed": 1}, "E201: unknown key `sed` in a study"),
+        (correlated("gauge.parameters.bais"), "E206: no dispersed parameter `gauge.parameters.bais`"),
+        (correlated("gauge.parameters.bias"), "E207: `of` is a list of two different parameters"),
+        (correlated(is_=1.5), "E204: `is` is 1.5"),
+        (correlated(is_=1.0), "E204: the correlations are not positive definite"),
+        (correlated() | {"design": "latin_hypercube"}, "E214: a design `latin_hypercube` has no correlations"),
+        ({"correlations": correlated()["correlations"] * 2}, "E213: this pair has a correlation already"),
     ],
 )  # fmt: skip
 def test_wrong_studies(write: Write, changes: dict[str, Any], expected: str) -> None:

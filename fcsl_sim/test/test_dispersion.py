@@ -19,6 +19,7 @@ from fcsl_sim.campaign.dispersion import (
     Normal,
     Random,
     Uniform,
+    cholesky,
     random_share,
     shuffled,
 )
@@ -95,3 +96,33 @@ def test_corners() -> None:
     assert Choice((3, 1, 2), (1.0, 1.0, 1.0)).corners() == (1, 3)
     assert Normal(0.0, 1.0, None).corners() is None
     assert Normal(0.0, 1.0, (-1.0, 1.0)).corners() == (-1.0, 1.0)
+
+
+# ---- correlations ----------------------------------------------------------------------------------------------------
+
+CORRELATIONS = [[1.0, -0.6, 0.3, 0.0], [-0.6, 1.0, 0.4, 0.0], [0.3, 0.4, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+SPREADS = (Normal(400.0, 8.0, None), Normal(-1.0, 0.5, None), Uniform(2.0, 5.0), Uniform(0.0, 1.0))
+
+
+def test_cholesky_is_that_of_numpy() -> None:
+    assert np.allclose(cholesky(CORRELATIONS), np.linalg.cholesky(CORRELATIONS), rtol=0, atol=1e-15)
+    assert cholesky([[1.0, 0.9, -0.9], [0.9, 1.0, 0.9], [-0.9, 0.9, 1.0]]) is None
+    assert cholesky([[1.0, 1.0], [1.0, 1.0]]) is None
+
+
+def test_correlated_values_are_multivariate_normal_and_keep_their_distributions() -> None:
+    """By the estimates of NumPy and SciPy over 20000 cases."""
+    factor = cholesky(CORRELATIONS)
+    assert factor is not None
+    design = Random(7, list("abcd"), SPREADS, 20_000, factor)
+    table = np.array([design.values(case) for case in range(design.count)])
+    covariance = np.array([[64.0, -0.6 * 8.0 * 0.5], [-0.6 * 8.0 * 0.5, 0.25]])
+    assert np.allclose(np.cov(table[:, :2].T), covariance, rtol=0.05)
+    ranks = stats.spearmanr(table).statistic
+    assert np.allclose(ranks, 6.0 / np.pi * np.arcsin(np.array(CORRELATIONS) / 2.0), rtol=0, atol=5 / np.sqrt(20_000))
+    true = (("norm", (400.0, 8.0)), ("norm", (-1.0, 0.5)), ("uniform", (2.0, 3.0)), ("uniform", (0.0, 1.0)))
+    for column, (name, shape) in zip(table.T, true, strict=True):
+        assert stats.kstest(column, name, shape).pvalue > 1e-4
+    alone = Random(7, list("abcd"), SPREADS, 20_000)
+    for case in range(50):  # what is correlated with nothing before it stays, to the bit
+        assert [alone.values(case)[i] for i in (0, 3)] == [design.values(case)[i] for i in (0, 3)]

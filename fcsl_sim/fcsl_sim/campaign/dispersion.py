@@ -15,6 +15,8 @@ from statistics import NormalDist
 from typing import Protocol
 
 Value = bool | int | float
+#: Of a correlation matrix; less is a rounding.
+_LEAST_PIVOT = 1e-12
 
 
 class Distribution(Protocol):
@@ -134,18 +136,52 @@ class Design(Protocol):
         """One for each parameter, in the order of the study."""
 
 
+def cholesky(matrix: Sequence[Sequence[float]]) -> list[list[float]] | None:
+    """The lower triangle L with L L' = matrix, which is symmetric; None: it is not positive definite. In Python, so that it has the
+    same bits everywhere."""
+    rows: list[list[float]] = []
+    for i, wanted in enumerate(matrix):
+        row = [0.0] * len(matrix)
+        for j in range(i + 1):
+            left = wanted[j] - math.fsum(row[k] * (rows[j] if j < i else row)[k] for k in range(j))
+            if i == j:
+                if left <= _LEAST_PIVOT:
+                    return None
+                row[i] = math.sqrt(left)
+            else:
+                row[j] = left / rows[j][j]
+        rows.append(row)
+    return rows
+
+
 @dataclass(frozen=True)
 class Random:
-    """Each value by itself (a Monte Carlo campaign)."""
+    """A Monte Carlo campaign: each value by itself, but for `factor`, the lower triangle of the correlations. A Gaussian copula: normal
+    numbers are correlated, and the share of each decides its value."""
 
     seed: int
     paths: Sequence[str]
     distributions: Sequence[Distribution]
     count: int
+    factor: Sequence[Sequence[float]] = ()
 
     def values(self, case: int) -> tuple[Value, ...]:
-        pairs = zip(self.paths, self.distributions, strict=True)
-        return tuple(spread.at(random_share(self.seed, case, path)) for path, spread in pairs)
+        shares = [random_share(self.seed, case, path) for path in self.paths]
+        if self.factor:
+            shares = self._correlated(shares)
+        return tuple(spread.at(share) for spread, share in zip(self.distributions, shares, strict=True))
+
+    def _correlated(self, shares: Sequence[float]) -> list[float]:
+        """A value that is correlated with none before it stays as it is, to the bit."""
+        normal = NormalDist()
+        numbers = [normal.inv_cdf(min(max(share, 2.0**-54), 1.0 - 2.0**-53)) for share in shares]
+        found = []
+        for i, row in enumerate(self.factor):
+            correlated = any(row[:i])
+            found.append(
+                normal.cdf(math.fsum(map(math.prod, zip(row, numbers, strict=True)))) if correlated else shares[i]
+            )
+        return found
 
 
 @dataclass(frozen=True)

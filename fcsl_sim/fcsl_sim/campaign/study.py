@@ -35,6 +35,7 @@ from .dispersion import (
     Random,
     Uniform,
     Value,
+    cholesky,
     random_bits,
 )
 from .metric import RESERVED, Metric, MetricError
@@ -148,7 +149,17 @@ class _Reader:
         self.reader = ConfigReader(sink)
 
     def read(self, root: JsonNode, text: str, cases: int | None) -> Study:
-        optional = ("cases", "parameters", "metrics", "pass", "duration", "timeout_s", "tune", *_FOR_READERS)
+        optional = (
+            "cases",
+            "parameters",
+            "metrics",
+            "pass",
+            "duration",
+            "timeout_s",
+            "tune",
+            "correlations",
+            *_FOR_READERS,
+        )
         keys = self.reader.object(root, "a study", ("simulation", "seed", "design"), optional)
         self.sink.raise_if_failed()
         assert keys is not None
@@ -375,14 +386,18 @@ class _Reader:
         if name is None or ("cases" in keys and count is None):
             return None
         paths, spreads = [p.path for p in parameters], [p.distribution for p in parameters]
+        if name != "random" and "correlations" in keys:
+            fix = "use `random`"
+            self.sink.error("E214", f"a design `{name}` has no correlations", keys["correlations"].span, help=fix)
         if name in ("random", "latin_hypercube"):
             if "cases" not in keys:
                 self.sink.error(
                     "E202", f"a design `{name}` has no `cases`", keys["design"].span, help='add `"cases": 100`'
                 )
                 return None
-            kind = Random if name == "random" else LatinHypercube
-            return kind(seed, paths, spreads, given or count or 1)
+            if name == "latin_hypercube":
+                return LatinHypercube(seed, paths, spreads, given or count or 1)
+            return Random(seed, paths, spreads, given or count or 1, self._correlations(keys, paths))
         if "cases" in keys or given is not None:
             place = keys["cases"].span if "cases" in keys else keys["design"].span
             self.sink.error(
@@ -390,6 +405,31 @@ class _Reader:
             )
             return None
         return self._grid(name, keys["design"].span, parameters)
+
+    def _correlations(self, keys: dict[str, JsonNode], paths: Sequence[str]) -> Sequence[Sequence[float]]:
+        """The lower triangle of the matrix; empty without correlations, or after reporting errors."""
+        matrix = [[float(i == j) for j in range(len(paths))] for i in range(len(paths))]
+        for item in self.reader.list(keys.get("correlations"), "`correlations`"):
+            pair = self.reader.object(item, "a correlation", ("of", "is"))
+            if pair is None or len(pair) < 2:
+                continue
+            named = self.reader.list(pair["of"], "`of`")
+            places = [self.reader.reference(one, "dispersed parameter", paths) for one in named]
+            value = self.reader.number(pair["is"], "`is`", -1.0, 1.0)
+            if pair["of"].kind == "array" and (len(places) != 2 or (None not in places and places[0] == places[1])):
+                self.sink.error(
+                    "E207", "`of` is a list of two different parameters", pair["of"].span, help="write […, …]"
+                )
+            elif len(places) == 2 and places[0] is not None and places[1] is not None and value is not None:
+                if matrix[places[0]][places[1]] != 0.0:
+                    self.sink.error("E213", "this pair has a correlation already", pair["of"].span)
+                matrix[places[0]][places[1]] = matrix[places[1]][places[0]] = value
+        factor = cholesky(matrix)
+        if factor is None:
+            why = "together they contradict each other, or one value follows from others"
+            span = keys["correlations"].span
+            self.sink.error("E204", "the correlations are not positive definite", span, why=why, help="weaken them")
+        return factor if factor and "correlations" in keys else ()
 
     def _grid(self, name: str, span: Span, parameters: Sequence[Dispersed]) -> Design | None:
         levels = []
