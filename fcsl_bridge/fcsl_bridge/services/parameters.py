@@ -22,6 +22,7 @@ from rclpy.parameter import Parameter
 from simclient.c_machine import TYPE_FORMATS
 from simclient.descriptor import Field, Machine
 from simclient.errors import TwinError
+from simclient.parameters import parameter_name
 from simclient.run import Run
 from simclient.values import INTEGER_RANGES, encode, enumerators, request_as_read, scalar_reader
 
@@ -31,18 +32,12 @@ _INTEGER_MAX = 2**63 - 1
 _FROZEN = "frozen: the compiler folded its value into the code; to set it, take it out of `frozen` in the machine JSON"
 
 
-def ros_name(field: Field) -> str:
-    """`pilot.parameters.targets[0].mass` is `pilot.targets.0.mass`."""
-    name = field.path.replace(f"{field.instance}.parameters.", f"{field.instance}.", 1)
-    return name.replace("[", ".").replace("]", "")
-
-
 class MachineParameters:
     """The parameters of a run, declared in a node until `close`."""
 
     def __init__(self, node: Node, run: Run):
         self._node, self._run = node, run
-        self._fields = {ros_name(f): f for f in run.machine.fields.values() if f.role == "parameter"}
+        self._fields = {parameter_name(f): f for f in run.machine.fields.values() if f.role == "parameter"}
         self._descriptors: dict[str, ParameterDescriptor] = {}
         self._refreshing = False
         for name, field in self._fields.items():
