@@ -56,13 +56,14 @@ RICH: dict[str, Any] = {
         "gauge.parameters.dropout": {"choice": [False, True], "weights": [9, 1]},
         "gauge.inputs.truth": {"linear": [0.0, 1.0, 5]},
     },
+    "correlations": [{"of": ["gauge.parameters.bias", "gauge.parameters.sigma"], "is": -0.5}],
     "metrics": {"average": "mean(gauge.outputs.value)", "offset": "average - 3.0"},
     "pass": "abs(offset) < 1.3",
     "duration": 0.5,
     "timeout_s": 5.0,
 }
 #: A sweep, and corners, with as many cases as there are combinations.
-SWEEP = {key: value for key, value in RICH.items() if key != "cases"} | {
+SWEEP = {key: value for key, value in RICH.items() if key not in ("cases", "correlations")} | {
     "design": "sweep",
     "parameters": {"gauge.parameters.bias": {"choice": [1.0]}, "other.parameters.bias": {"linear": [0.0, 1.0, 2]}},
 }

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 from test_set_argument import write_loop
 
@@ -15,6 +16,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim.campaign.flight import Flights
 from fcsl_sim.campaign.study import read_study
 from fcsl_sim.cli import main
+from fcsl_sim.verbs import STUDY_SCHEMA
 
 #: x' = gain * count * (targets[0] + targets[1] - x) at 50 Hz, from x(0), which differs from case to case.
 STUDY: dict[str, Any] = {
@@ -163,6 +165,29 @@ def test_a_wrong_tune(write: Write, tune: dict[str, Any], message: str) -> None:
     with pytest.raises(DiagnosticError) as error:
         read_study(Path(write(tune, parameters=dispersed)))
     assert message in str(error.value) and "loop.study.json:" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"parameters": {}},
+        {"parameters": {"a.inputs.u": {}}},
+        {"parameters": {"law.parameters.gain": {"range": [2, 3]}}},
+        {"population": 4},
+        {"cases": 0},
+        {"minimise": 3},
+        {"cost": "final"},
+    ],
+)
+def test_the_schema_knows_it(write: Write, change: dict[str, Any]) -> None:
+    """It refuses what the reader refuses, and takes what that takes."""
+    validator = jsonschema.Draft202012Validator(json.loads(STUDY_SCHEMA.read_text()))
+    good = json.loads(Path(write({"parameters": {"law.parameters.gain": {}}})).read_text())
+    validator.validate(good)
+    study = Path(write(change))
+    with pytest.raises(DiagnosticError):
+        read_study(study)
+    assert not validator.is_valid(json.loads(study.read_text()))
 
 
 def test_what_it_cannot_do(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
