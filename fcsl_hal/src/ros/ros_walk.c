@@ -78,13 +78,16 @@ static fcsl_ros_status_t walk_choice(const fcsl_ros_reader_plan_t *conversion, c
     const char *text = NULL;
     uint32_t length = 0;
     const fcsl_ros_status_t status = take_string(cursor, &text, &length);
+    if (status != FCSL_ROS_TAKEN) {
+        return status;
+    }
     uint32_t index = 0;
     while (index < part->count && !same_text(conversion->names[part->first + index], text, length)) {
         index++;
     }
     walk->indices[part->size] = index;
     walk->anchors[part->size] = (const uint8_t *)&walk->indices[part->size];
-    return status;
+    return FCSL_ROS_TAKEN;
 }
 
 /* Each string takes four bytes or more of the message, so there are no more turns than that. */
