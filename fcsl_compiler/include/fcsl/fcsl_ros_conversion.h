@@ -45,7 +45,8 @@ typedef enum {
                               behind those stands its REPEAT; anchor `first` is the length (or FCSL_ROS_NONE) */
     FCSL_ROS_REPEAT = 5, /* the parts up to part `first`, for each of the rest */
     FCSL_ROS_END = 6, /* back to part `first`, its REPEAT */
-    FCSL_ROS_FIND = 7, /* a sequence of messages: the parts up to part `first`, its FOUND, for each until a KEY fits, and
+    FCSL_ROS_FIND =
+        7, /* a sequence of messages: the parts up to part `first`, its FOUND, for each until a KEY fits, and
                           back to where it begins; anchors size .. size + count lie in the element, or are null */
     FCSL_ROS_KEY = 8, /* a string, which names[first] is in the element that is looked for */
     FCSL_ROS_FOUND = 9, /* back to part `first`, its FIND */
