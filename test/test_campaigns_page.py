@@ -23,6 +23,13 @@ def test_its_study_is_the_example() -> None:
     assert json.loads(text) == json.loads((ROOT / name).read_text())
 
 
+def test_its_gains_are_those_of_the_example() -> None:
+    (part,) = (block for block in re.findall(r"```json\n(.*?)```\n", PAGE, re.DOTALL) if '"tune"' in block)
+    study = json.loads((ROOT / "examples/quadrotor/sim/rate_loop.study.json").read_text())
+    found = json.loads(f"{{{part}}}")
+    assert found == {key: study[key] for key in found}
+
+
 def test_its_test_passes(tmp_path: Path) -> None:
     blocks = re.findall(r"```python\n(.*?)```\n", PAGE, re.DOTALL)
     (code,) = (block for block in blocks if "fcsl_campaign" in block)
