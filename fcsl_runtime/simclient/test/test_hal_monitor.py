@@ -21,7 +21,7 @@ import pytest
 from hal_rig import HAL, Iio, environment, run, write_plan
 
 from simclient.hal.monitor_plot import Curves
-from simclient.hal.screen import Screen
+from simclient.screen import Screen
 from simclient.hal.watch import Watch
 
 

@@ -30,7 +30,7 @@ from simclient.vars.arguments import make_parser
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.find import Server, find_server, named_address, running_servers
-from simclient.vars.screen import Screen
+from simclient.screen import Screen
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
 from simclient.vars.value_text import read_value

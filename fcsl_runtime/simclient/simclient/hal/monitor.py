@@ -12,11 +12,11 @@ from contextlib import ExitStack
 
 from ..board.plan import find_sensor, read_plan
 from ..errors import TwinError
+from ..screen import Screen
 from ..vars.show import jsonable
 from .errors import Refused
 from .monitor_plot import Curves
 from .monitor_text import sensor_lines, table_lines
-from .screen import Screen
 from .watch import Watch
 
 _NS_PER_S = 1_000_000_000

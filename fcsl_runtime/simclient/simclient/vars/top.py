@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..instance_times import NOT_MEASURED, STEP, InstanceTime, of_stats
+from ..screen import Screen
 from .answers import open_client, print_answer, status_text
 from .client import VarClient
-from .screen import Screen
 from .show import table
 from .wire import VarError
 

@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
+from ..screen import Screen
 from .answers import units_of
 from .client import VarClient
-from .screen import Screen
 from .show import flat, jsonable, show_value, with_unit
 from .subscription import Sample, Subscription
 from .terminal_plot import draw_panel
