@@ -69,7 +69,7 @@ def trials(folder: str) -> list[str]:
 def test_it_finds_what_is_known(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
     """The mean of x at the end is 0.6 for this target, by the recurrence of the loop."""
     study = write()
-    assert main(["tune", study]) == 0
+    assert main(["tune", study, "--jobs", "1"]) == 0
     said = capsys.readouterr()
     kept = (1.0 - 1.0 * 2 / 50) ** 49  # of x - target, at the last tick
     starts = [read_study(Path(study)).values(case)[0] for case in range(2)]
@@ -88,7 +88,7 @@ def test_it_finds_what_is_known(write: Write, capsys: pytest.CaptureFixture[str]
 def test_pass_comes_before_cost(write: Write) -> None:
     """The best cost would need a higher gain than the speed allows; u at the beginning is gain * count * (0.75 - x)."""
     tune = {"parameters": {"law.parameters.gain": {}}, "minimise": "-final", "generations": 10}
-    assert main(["tune", write(tune, **{"pass": "fastest < 3.0"})]) in (0, 1)
+    assert main(["tune", write(tune, **{"pass": "fastest < 3.0"}), "--jobs", "1"]) in (0, 1)
     starts = [read_study(Path("loop.study.json")).values(case)[0] for case in range(2)]
     limit = 3.0 / 2 / (0.75 - min(starts))
     assert 0.9 * limit < result()["parameters"]["law.parameters.gain"]["after"] < limit
@@ -111,13 +111,13 @@ def test_the_same_whoever_flies_and_however_often_it_is_killed(
     for name in ("parameters.yaml", "result.json", "tune.png"):
         Path("two", name).unlink()
     capsys.readouterr()
-    main(["tune", study, "-o", "two"])
+    main(["tune", study, "--jobs", "1", "-o", "two"])
     said = capsys.readouterr().err
     assert files("one") == files("two") and set(trials("one")) < set(trials("two"))
     assert "two: 8 candidates are there already" in said and "2 lines damaged, so flown again" in said
     assert main(["tune", write({"generations": 5}), "-o", "two"]) == 2
     assert "has trials of another study" in capsys.readouterr().err
-    main(["tune", write({"generations": 4}), "-o", "two", "--restart"])
+    main(["tune", write({"generations": 4}), "-o", "two", "--jobs", "1", "--restart"])
     assert files("one") == files("two") and trials("one") == trials("two")
 
 
@@ -125,7 +125,7 @@ def test_the_file_flies_as_the_result_did(write: Write, capsys: pytest.CaptureFi
     """`fcsl campaign --parameters`, bit for bit; `--parameters` of a search is where it begins, and stays in the file."""
     Path("begin.yaml").write_text("lead: {ros__parameters: {law.gain: 3.0}}")
     study = write({"generations": 1})
-    main(["tune", study, "--parameters", "begin.yaml"])
+    main(["tune", study, "--jobs", "1", "--parameters", "begin.yaml"])
     assert "    law.gain: 3.0  # [1/s]\n" in Path("loop.tune/parameters.yaml").read_text()
     gains = (result()["parameters"]["law.parameters.targets[0]"]["after"],)
     flights = Flights.of(Path(study), parameters="begin.yaml")
@@ -134,7 +134,7 @@ def test_the_file_flies_as_the_result_did(write: Write, capsys: pytest.CaptureFi
     capsys.readouterr()
     main(["campaign", study, "--case", "5", "--json", "--parameters", "loop.tune/parameters.yaml"])
     assert json.loads(capsys.readouterr().out)["hash"] == outcome.hash
-    main(["campaign", study, "--parameters", "loop.tune/parameters.yaml"])
+    main(["campaign", study, "--jobs", "1", "--parameters", "loop.tune/parameters.yaml"])
     assert "7 of 7 passed" in capsys.readouterr().out
 
 
