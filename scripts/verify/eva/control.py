@@ -49,7 +49,7 @@ _DEFECTS = (
     ("an overflow", "a != INT32_MIN", "a != INT32_MAX", "overflow"),
     ("a local without its zero", "uint32_t fault = 0;", "uint32_t fault;", "initialization"),
     ("a machine without its zeros", "memset(m, 0, sizeof *m);", "", "initialization"),
-    ("code that no run reaches", "control_pick_init(&m->i_pick);", "return 1;", "never reached"),
+    ("code that no run reaches", "(void)m;\n    return 0;", "return 1;", "never reached"),
     ("a step that does not end", "m->tick += 1u;", "for (;;) {\n    }", "non-terminating"),
 )
 
