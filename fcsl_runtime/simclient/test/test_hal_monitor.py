@@ -21,8 +21,8 @@ import pytest
 from hal_rig import HAL, Iio, environment, run, write_plan
 
 from simclient.hal.monitor_plot import Curves
-from simclient.screen import Screen
 from simclient.hal.watch import Watch
+from simclient.screen import Screen
 
 
 @pytest.fixture

@@ -26,11 +26,11 @@ from kill_points import CannotTrace, calls_until_killed
 from native import Fc, flying
 
 from fcsl_compiler.cli.complete import SHELLS, candidates, words_of
+from simclient.screen import Screen
 from simclient.vars.arguments import make_parser
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.find import Server, find_server, named_address, running_servers
-from simclient.screen import Screen
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
 from simclient.vars.value_text import read_value
