@@ -43,7 +43,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def library(root: Path) -> str:
-    (library,) = root.glob("*.so")
+    (library,) = root.glob("lib*.so")
     return library.name
 
 
