@@ -30,7 +30,7 @@ class Summary(ctypes.Structure):
 def code(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     library = tmp_path_factory.mktemp("histogram") / "libhistogram.so"
     flags = [*CFLAGS, f"-I{RUNTIME / 'include'}"]
-    subprocess.run(["cc", *flags, str(RUNTIME / "src/history/histogram.c"), "-o", str(library)], check=True)
+    subprocess.run(["cc", *flags, str(RUNTIME / "src/base/histogram.c"), "-o", str(library)], check=True)
     loaded = ctypes.CDLL(str(library))
     loaded.fcsl_histogram_add.argtypes = [ctypes.POINTER(Histogram), ctypes.c_uint64]
     loaded.fcsl_histogram_end.argtypes = [ctypes.c_uint32]
