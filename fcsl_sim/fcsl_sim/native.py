@@ -16,7 +16,7 @@ from types import TracebackType
 from fcsl_compiler.api.packages import PackageNotFound, package_prefix
 from fcsl_compiler.api.types import count_of, shape_of
 from simclient.c_machine import CMachine
-from simclient.c_run import VERDICTS, CError
+from simclient.c_run import TIMES, VERDICTS, CError
 from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.instance_times import InstanceTime, read_times
@@ -145,6 +145,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_data": (ptr, [ptr]),
     "fcsl_parameters_write": (c_int64, [POINTER(CMachine), ptr, ptr, ptr, c_size_t]),
     **VERDICTS,
+    **TIMES,
 }
 
 #: fcsl_sim_status_t by number.

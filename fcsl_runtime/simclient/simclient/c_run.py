@@ -103,6 +103,8 @@ VERDICTS: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_verdict": (None, [ptr, ptr, c_uint32, POINTER(CVerdict)]),
     "fcsl_run_verdict_text": (None, [ptr, POINTER(CVerdict), ptr]),
 }
+#: What reads the times of the instances of a run.
+TIMES: dict[str, tuple[type | None, list[type]]] = {"fcsl_run_time": (c_int, [ptr, c_uint32, POINTER(CTime)])}
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -113,7 +115,6 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),
     "fcsl_run_tick": (c_uint64, [ptr]),
-    "fcsl_run_time": (c_int, [ptr, c_uint32, POINTER(CTime)]),
     "fcsl_run_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_check_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),
@@ -159,6 +160,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_use_monitor": (c_int, [ptr, POINTER(CMonitor), _ERROR]),
     "fcsl_run_judge": (None, [ptr, c_char_p, c_uint64, c_uint64]),
     **VERDICTS,
+    **TIMES,
     "fcsl_run_feed_series": (c_int, [ptr, POINTER(CSeries), c_uint32, c_uint64, _ERROR]),
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),

@@ -19,7 +19,7 @@
 enum { STEPS = 1000, SECONDS_MAX = 10000 };
 
 typedef struct {
-    fcsl_sim_t *(*open)(const char *plan, size_t size, fcsl_error_t *error);
+    fcsl_sim_t *(*open)(const char *plan, size_t size, const fcsl_parameters_t *parameters, fcsl_error_t *error);
     int (*close)(fcsl_sim_t *sim, fcsl_error_t *error);
     int64_t (*run)(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
     uint64_t (*ticks)(const fcsl_sim_t *sim);
@@ -96,7 +96,7 @@ static void fly(const simulator_t *simulator, const by_hand_plant_t *plant, cons
                 times_t *times, void *simulated, void *by_hand, void *apart)
 {
     fcsl_error_t error = {{0}};
-    fcsl_sim_t *sim = simulator->open(plan, size, &error);
+    fcsl_sim_t *sim = simulator->open(plan, size, NULL, &error);
     if (sim == NULL) {
         fail("simulator", error.text);
     }
