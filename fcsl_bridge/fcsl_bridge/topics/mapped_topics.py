@@ -131,7 +131,8 @@ class _Input:
         """Takes no messages while one publisher has another definition of them, which would be misread."""
         found = self._node.get_publishers_info_by_topic(self.name)
         self.contested += self.topic.type != _SHARED and len(found) > 1
-        others = {str(p.topic_type_hash) for p in found if p.topic_type_hash.version} - {self.topic.type_hash}
+        alike = [p for p in found if p.topic_type == self.topic.type and p.topic_type_hash.version]
+        others = {str(p.topic_type_hash) for p in alike} - {self.topic.type_hash}
         if others and not self._foreign:
             self._node.get_logger().error(
                 f"{self.name}: refused: a publisher has another definition of {self.topic.type} ({min(others)} instead "
