@@ -47,13 +47,21 @@ def runtime_program(name: str) -> Path:
     return program
 
 
+class _Library(ctypes.CDLL):
+    """Has no function without a prototype: ctypes would cut pointers to 32 bits."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"{name} has no prototype here")
+
+
 def bind(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
-    """Loads a library with these prototypes. Raises OSError, or AttributeError for a missing function."""
-    library = ctypes.CDLL(str(path))
+    """Loads a library with these functions, and no others. Raises OSError, or AttributeError for a missing function."""
+    library = _Library(str(path))
     for name, (result, arguments) in prototypes.items():
-        function = getattr(library, name)
+        function = library[name]
         function.restype = result
         function.argtypes = arguments
+        setattr(library, name, function)
     return library
 
 

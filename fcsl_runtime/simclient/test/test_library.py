@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from ctypes import c_int
+from ctypes import c_int, c_uint64
 from pathlib import Path
 
 import pytest
@@ -56,6 +56,13 @@ def test_another_library_is_no_runtime(tmp_path: Path) -> None:
         bind_runtime(tmp_path / "text.so", {})
     with pytest.raises(TwinError, match="cannot be used as the FCSL runtime: .*fcsl_no_function"):
         bind_runtime(runtime_library(), {"fcsl_no_function": (c_int, [])})
+
+
+def test_a_function_without_a_prototype_cannot_be_called() -> None:
+    library = bind_runtime(runtime_library(), {"fcsl_run_ieee_mode": (c_uint64, [])})
+    assert library.fcsl_run_ieee_mode() != 0
+    with pytest.raises(AttributeError, match="fcsl_run_tick has no prototype"):
+        library.fcsl_run_tick  # noqa: B018
 
 
 @pytest.mark.parametrize(
