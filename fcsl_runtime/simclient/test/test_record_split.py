@@ -19,7 +19,9 @@ from native import FIXTURE, GYRO, Refused, Run
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from test_record_faults import CUT
+from test_requirements import machine
 
+from simclient import AlgTwin
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
@@ -134,6 +136,23 @@ def test_what_is_around_a_fault_is_kept(tmp_path: Path) -> None:
     cut(opened, tmp_path / "cut", 0, 10**12)
     (missing,) = replay(tmp_path / "cut", library=FIXTURE).missing
     assert f"to {gap - 1} were not verified: the bag does not have them" in missing
+
+
+def test_what_is_around_a_violation_is_kept(tmp_path: Path) -> None:
+    """x is too large for 0.1 s, at 30 s of 60 s."""
+    required = [{"id": "LOW-1", "text": "x is low.", "then": "src.outputs.x < 2.0"}]
+    twin = AlgTwin.from_config(machine(tmp_path, required))
+    hz = twin.machine.tick_hz
+    twin.record(tmp_path / "bag", split="around=4")
+    for x, ticks in ((1.0, 30 * hz), (3.0, hz // 10), (1.0, 30 * hz)):
+        twin.set("src.outputs.x", x)
+        twin.tick(ticks)
+    twin.stop_recording()
+    assert [verdict.violations for verdict in twin.requirements.values()] == [1]
+    bag = Bag(tmp_path / "bag")
+    state = bag.machine().state
+    seconds = {bag.decode(state, data).tick // hz for _, _, data in bag.messages({state})}
+    assert {*range(26, 34), *range(56, 60)} <= seconds and not seconds & {*range(0, 19), *range(41, 50)}
 
 
 @pytest.mark.parametrize(
