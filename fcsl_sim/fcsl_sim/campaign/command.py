@@ -6,8 +6,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 from dataclasses import asdict
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,12 @@ from ..watchdog import Watchdog
 from . import report
 from .engine import open_engine
 from .flight import Flight, Flights, Outcome
+from .progress import Progress
 from .requirements import requirements
 from .results import Results
 from .study import Study, read_study
 
 EXIT_FAILED = 1
-_PROGRESS_PERIOD_S = 2.0
 _SUFFIXES = (".study.json", ".json")
 
 
@@ -63,7 +63,7 @@ def _fly_missing(study: Study, results: Results, options: Any) -> None:
     jobs = min(options.jobs or len(os.sched_getaffinity(0)), max(1, study.cases - results.done))
     if results.done == study.cases:
         return
-    progress = _Progress(results)
+    progress = Progress(partial(_progress, results, results.done))
     with open_engine(options.engine, study, jobs, options.cases) as engine:
         for _, outcome in engine.fly(map(Flight, results.missing()), progress.show):
             results.add(outcome)
@@ -116,25 +116,10 @@ def _summary(results: Results, table: Path, page: Path) -> dict[str, Any]:
     }
 
 
-class _Progress:
-    """A line on standard error every 2 s, with the time that is left."""
-
-    def __init__(self, results: Results):
-        self._results, self._first = results, results.done
-        self._begun = self._shown = time.monotonic()
-
-    def show(self) -> None:
-        now = time.monotonic()
-        if now - self._shown >= _PROGRESS_PERIOD_S:
-            self._shown = now
-            self._print(now)
-
-    def end(self) -> None:
-        self._print(time.monotonic())
-
-    def _print(self, now: float) -> None:
-        done, cases = self._results.done, self._results.study.cases
-        rate = (done - self._first) / max(now - self._begun, 1e-9)
-        left = f", {(cases - done) / rate:.0f} s left" if rate > 0 and done < cases else ""
-        failed = self._results.count("failed") + self._results.count("error")
-        print(f"  {done} of {cases} cases, {failed} not passed, {rate:.3g} a second{left}", file=sys.stderr)
+def _progress(results: Results, first: int, seconds: float) -> str:
+    """`first`: cases that were there before."""
+    done, cases = results.done, results.study.cases
+    rate = (done - first) / seconds
+    left = f", {(cases - done) / rate:.0f} s left" if rate > 0 and done < cases else ""
+    failed = results.count("failed") + results.count("error")
+    return f"{done} of {cases} cases, {failed} not passed, {rate:.3g} a second{left}"

@@ -6,9 +6,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from ..campaign.case_rows import written_whole
 from ..campaign.engine import Engine, open_engine
 from ..campaign.flight import Flight, Flights, Outcome
+from ..campaign.progress import Progress
 from ..campaign.report import wilson
 from ..campaign.study import Study, read_study
 from ..errors import SimError
@@ -29,7 +30,6 @@ from .trial_log import TrialLog
 
 EXIT_NOT_PASSED = 1
 PARAMETERS, PICTURE, RESULT = "parameters.yaml", "tune.png", "result.json"
-_PROGRESS_PERIOD_S = 2.0
 #: Of cases that did not pass.
 _NAMED = 5
 _SUFFIXES = (".study.json", ".json")
@@ -53,9 +53,9 @@ def run_tune(options: Any) -> int:
         print(f"{folder}: {len(log.trials)} candidates are there already", file=sys.stderr)
     try:
         with open_engine(options.engine, study, options.jobs or len(os.sched_getaffinity(0))) as engine:
-            progress = _Progress()
-            search = progress.search = Search(study, engine, log, flights.own_gains(), progress.show)
-            search.run()
+            search = Search(study, engine, log, flights.own_gains())
+            progress = Progress(partial(_progress, search))
+            search.run(progress.show)
             progress.end()
             before, after = (_judged(study, engine, gains) for gains in ((), search.best.candidate))
     finally:
@@ -164,31 +164,13 @@ def _number(value: float | None) -> str:
     return "never a number" if value is None else f"{value:.5g}"
 
 
-class _Progress:
-    """A line on standard error every 2 s, with the time that is left at most."""
-
-    def __init__(self) -> None:
-        self.search: Search | None = None
-        self._begun = self._shown = time.monotonic()
-
-    def show(self) -> None:
-        now = time.monotonic()
-        if now - self._shown >= _PROGRESS_PERIOD_S:
-            self._shown = now
-            self._print(now)
-
-    def end(self) -> None:
-        self._print(time.monotonic())
-
-    def _print(self, now: float) -> None:
-        search = self.search
-        if search is None or not search.generations:
-            return
-        tune, done = search.tune, len(search.generations)
-        rate = search.flown / max(now - self._begun, 1e-9)
-        left = (tune.generations + 1 - done) * tune.population * tune.cases / rate if rate > 0 else 0.0
-        print(
-            f"  generation {done} of {tune.generations + 1}, {len(search.log.trials)} candidates, best "
-            f"{search.best_score()}, {rate:.3g} flights a second, {left:.0f} s left at most",
-            file=sys.stderr,
-        )
+def _progress(search: Search, seconds: float) -> str:
+    if not search.generations:
+        return ""
+    tune, done = search.tune, len(search.generations)
+    rate = search.flown / seconds
+    left = (tune.generations + 1 - done) * tune.population * tune.cases / rate if rate > 0 else 0.0
+    return (
+        f"generation {done} of {tune.generations + 1}, {len(search.log.trials)} candidates, best {search.best_score()}, "
+        f"{rate:.3g} flights a second, {left:.0f} s left at most"
+    )

@@ -26,15 +26,16 @@ class Search:
     """`before` is the trial of the machine's own values; `generations` are the trials of each generation. `flown` counts flights of
     this process."""
 
-    def __init__(self, study: Study, engine: Engine, log: TrialLog, own: Sequence[float], progress: Callable[[], None]):
+    def __init__(self, study: Study, engine: Engine, log: TrialLog, own: Sequence[float]):
         assert study.tune
-        self.study, self.tune, self.engine, self.log, self.progress = study, study.tune, engine, log, progress
+        self.study, self.tune, self.engine, self.log = study, study.tune, engine, log
         self.own = tuple(own)
         self.generations: list[list[Trial]] = []
         self.flown = 0
 
-    def run(self) -> None:
-        """`best` is the trial that is best; of equal ones the first."""
+    def run(self, progress: Callable[[], None]) -> None:
+        """`best` is the trial that is best; of equal ones the first. `progress` is called while flights are flown."""
+        self._progress = progress
         from scipy.optimize import differential_evolution
         from scipy.stats import qmc
 
@@ -80,7 +81,7 @@ class Search:
         missing = dict.fromkeys(c for c in candidates if c not in self.log.trials)
         outcomes: dict[Candidate, dict[int, Outcome]] = {candidate: {} for candidate in missing}
         flights = [Flight(case, candidate) for candidate in missing for case in range(self.tune.cases)]
-        for flight, outcome in self.engine.fly(flights, self.progress) if flights else ():
+        for flight, outcome in self.engine.fly(flights, self._progress) if flights else ():
             self.flown += 1
             found = outcomes[flight.gains]
             found[flight.case] = outcome
