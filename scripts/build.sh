@@ -16,9 +16,16 @@ if [ "${1:-}" = --no-tests ]; then
     shift
     rm -f build/.fcsl-built # the programs of tests are no longer up to date
 fi
+# Two builds of one tree damage each other's files. The descriptor goes to no process that outlives this one.
+mkdir -p build
+exec 4> build/.lock
+if ! flock -n 4; then
+    say "another build of this workspace runs; waiting for it"
+    flock 4
+fi
 started=$(mktemp)
 # colcon names packages as they start and finish; between, show every 10 s what the compiler is at.
-heartbeat log/latest_build &
+heartbeat log/latest_build 4>&- &
 heartbeat=$!
 trap 'kill "$heartbeat" 2> /dev/null || true; rm -f "$started"' EXIT
 if ! colcon build ${1:+--packages-up-to "$@"} --cmake-args "-DBUILD_TESTING=$tests"; then
