@@ -180,6 +180,7 @@ def main() -> int:
     folder = OUT / "ray"
     try:
         packages = installed(folder / "packages")
+        (folder / "COLCON_IGNORE").touch()  # what is installed here is no package of the workspace
         shutil.rmtree(folder / "campaigns", ignore_errors=True)
         (folder / "campaigns").mkdir()
         facts = compare(options.cases, folder / "campaigns", packages)
