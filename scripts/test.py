@@ -29,7 +29,7 @@ WORKSPACE_RESULTS = RESULTS / "workspace_tests.xml"
 #: On one core, beside tests. `make test` has set up.
 LINT = Job("lint", ("make", "-o", "setup", "lint"))
 #: Upper bound of a run, seconds.
-LIMIT_S = 4800.0
+LIMIT_S = 2400.0
 #: How much of the message of a failed test is shown, in lines and in characters a line.
 _LINES_MAX, _CHARACTERS_MAX = 12, 300
 

@@ -41,16 +41,21 @@ from fcsl_bridge.topics.interfaces import message_class
 
 rclpy.init()
 node, topic, messages = rclpy.create_node("one_message"), sys.argv[1], []
+end = time.monotonic() + 30.0
 while topic not in (known := dict(node.get_topic_names_and_types())):
+    if time.monotonic() > end:
+        sys.exit(f"nobody publishes {topic}")
     time.sleep(0.05)
 node.create_subscription(message_class(known[topic][0]), topic, messages.append, 10)
 while not messages:
-    rclpy.spin_once(node)
+    if time.monotonic() > end:
+        sys.exit(f"no message on {topic}")
+    rclpy.spin_once(node, timeout_sec=1.0)
 for name in messages[0].get_fields_and_field_types():
     print(f"{name}: {getattr(messages[0], name)}")
 """
-#: What a user sees before he goes on: the machine runs, and the robot's odometry arms it.
-WAIT = 'until ros2 topic echo --once /my_rover/controller | grep -qi "armed: true"; do :; done\n'
+#: What a user sees before he goes on: the machine runs, and the robot's odometry arms it. A node that has ended is not waited for.
+WAIT = 'until ros2 topic echo --once /my_rover/controller | grep -qi "armed: true"; do kill -0 $!; done\n'
 
 
 def steps() -> list[tuple[str, str]]:

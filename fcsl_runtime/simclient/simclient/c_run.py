@@ -132,6 +132,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_hardware_failures": (c_uint64, [ptr]),
     "fcsl_hw_sim_register": (c_uint32, [POINTER(CSimulatedHardware), c_uint32]),
     "fcsl_hw_sim_set_register": (c_int32, [POINTER(CSimulatedHardware), c_uint32, c_uint32]),
+    "fcsl_run_monotonic_ns": (c_uint64, [ptr]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_substitute_events": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_next_event": (c_uint64, [ptr, c_uint64, POINTER(CToldEvent)]),

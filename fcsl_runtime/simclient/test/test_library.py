@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from ctypes import c_int, c_uint64
 from pathlib import Path
@@ -13,6 +14,7 @@ from simclient import TwinError
 from simclient.cli import missing_package
 from simclient.library import RUNTIME_LIBRARY, RUNTIME_PACKAGE, bind_runtime, runtime_library, runtime_program
 
+WORKSPACE = Path(__file__).resolve().parents[3]
 FINDERS: dict[str, Callable[[], Path]] = {
     f"lib/{RUNTIME_LIBRARY}": runtime_library,
     "bin/fcsl-fc": lambda: runtime_program("fcsl-fc"),
@@ -56,6 +58,17 @@ def test_another_library_is_no_runtime(tmp_path: Path) -> None:
         bind_runtime(tmp_path / "text.so", {})
     with pytest.raises(TwinError, match="cannot be used as the FCSL runtime: .*fcsl_no_function"):
         bind_runtime(runtime_library(), {"fcsl_no_function": (c_int, [])})
+
+
+def test_each_function_that_is_named_has_a_prototype() -> None:
+    """In simclient, the simulator and the nodes. `lib.fcsl_x` is a use, `"fcsl_x"` an entry of a table."""
+    used, tables = set[str](), set[str]()
+    for folder in ("fcsl_runtime/simclient/simclient", "fcsl_sim/fcsl_sim", "fcsl_bridge/fcsl_bridge"):
+        for file in (WORKSPACE / folder).rglob("*.py"):
+            text = file.read_text()
+            used |= set(re.findall(r"(?i)lib(?:rary)?(?:\(\))?\.(fcsl_\w+)", text))
+            tables |= set(re.findall(r'"(fcsl_\w+)": \(', text))
+    assert len(used) > 50 and used <= tables, used - tables
 
 
 def test_a_function_without_a_prototype_cannot_be_called() -> None:

@@ -22,7 +22,7 @@ from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 
 from ..errors import BagError
-from ..library import runtime_library
+from ..library import Prototypes, bind_runtime, runtime_library
 from .batch import ENTRY, Batch
 from .losses import Loss, Losses
 from .mcap_walk import CHUNK_HEAD, LOST, LOST_MARK, MAGIC, RECORD_HEAD, Gap, Record, Walk
@@ -215,18 +215,17 @@ def _list(data: bytes, begin: int) -> np.ndarray[Any, Any]:
     return records[:count]
 
 
+_PROTOTYPES: Prototypes = {
+    "fcsl_mcap_records": (
+        ctypes.c_size_t,
+        [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t],
+    )
+}
+
+
 @functools.cache
 def _native() -> ctypes.CDLL:
-    library = ctypes.CDLL(str(runtime_library()))
-    library.fcsl_mcap_records.restype = ctypes.c_size_t
-    library.fcsl_mcap_records.argtypes = [
-        ctypes.c_char_p,
-        ctypes.c_size_t,
-        ctypes.c_size_t,
-        ctypes.c_void_p,
-        ctypes.c_size_t,
-    ]
-    return library
+    return bind_runtime(runtime_library(), _PROTOTYPES)
 
 
 class _Piece(NamedTuple):
