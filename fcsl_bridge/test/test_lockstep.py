@@ -36,16 +36,22 @@ def load() -> Iterator[None]:
         process.wait()
 
 
-def fly(domain: Domain, *remap: str, duration: str) -> tuple[Path, int, int]:
+def where(domain: Domain, place: str) -> dict[str, str]:
+    """The nodes' parameter for a place to meet: the bus, by default, or a socket."""
+    return {"bus": f"unix:{domain.folder}/socket"} if place == "unix" else {}
+
+
+def fly(domain: Domain, *remap: str, duration: str, place: str = "bus") -> tuple[Path, int, int]:
     """A whole flight; returns the bag and the exit statuses of simulator and controller."""
-    bag = domain.folder / "bag"
-    controller = domain.start("controller_node", *remap, machine=MACHINE, record=bag, timeout_s=60.0)
-    sim = domain.start("sim_node", *remap, sim=SIM, seed=SEED, duration=duration, timeout_s=60.0)
+    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **where(domain, place)}
+    controller = domain.start("controller_node", *remap, machine=MACHINE, record=bag, **both)
+    sim = domain.start("sim_node", *remap, sim=SIM, seed=SEED, duration=duration, **both)
     return bag, sim.finish(), controller.finish()
 
 
-def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int, str], Path]) -> None:
-    bag, sim, controller = fly(domain, duration=DURATION)
+@pytest.mark.parametrize("place", ["bus", "unix"])
+def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int, str], Path], place: str) -> None:
+    bag, sim, controller = fly(domain, duration=DURATION, place=place)
     assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
     assert digest(bag) == digest(reference(SEED, DURATION)) != digest(reference(SEED + 1, DURATION))
     controller_node, sim_node = domain.processes
@@ -54,11 +60,12 @@ def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int,
     assert f"the simulator ended the run: {TICKS} ticks" in controller_node.out
 
 
+@pytest.mark.parametrize("place", ["bus", "unix"])
 def test_flight_under_load_and_in_a_namespace(
-    domain: Domain, reference: Callable[[int, str], Path], load: None
+    domain: Domain, reference: Callable[[int, str], Path], load: None, place: str
 ) -> None:
     """With a change of state: load must not change requests and transitions either."""
-    bag, sim, controller = fly(domain, "-r", "__ns:=/fleet/one", duration=DURATION)
+    bag, sim, controller = fly(domain, "-r", "__ns:=/fleet/one", duration=DURATION, place=place)
     assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
     assert "ASCENT -> COAST" in domain.processes[0].err
     assert digest(bag) == digest(reference(SEED, DURATION))
@@ -77,9 +84,10 @@ def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
     assert "/rosout" in counts
 
 
-def test_killed_controller(domain: Domain) -> None:
-    controller = domain.start("controller_node", machine=MACHINE)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=PATIENCE_S)
+@pytest.mark.parametrize("place", ["bus", "unix"])
+def test_killed_controller(domain: Domain, place: str) -> None:
+    controller = domain.start("controller_node", machine=MACHINE, **where(domain, place))
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=PATIENCE_S, **where(domain, place))
     controller.wait_for("ASCENT -> COAST")
     controller.signal(signal.SIGKILL)
     controller.finish()
@@ -88,10 +96,11 @@ def test_killed_controller(domain: Domain) -> None:
     assert found and int(found[1]) >= 675, sim.err
 
 
-def test_killed_simulator(domain: Domain) -> None:
-    bag = domain.folder / "bag"
-    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=PATIENCE_S)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED)
+@pytest.mark.parametrize("place", ["bus", "unix"])
+def test_killed_simulator(domain: Domain, place: str) -> None:
+    bag, both = domain.folder / "bag", where(domain, place)
+    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=PATIENCE_S, **both)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, **both)
     controller.wait_for("ASCENT -> COAST")
     sim.signal(signal.SIGKILL)
     sim.finish()
@@ -101,12 +110,14 @@ def test_killed_simulator(domain: Domain) -> None:
     assert not Bag(bag).truncated
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_flight(domain: Domain, number: int) -> None:
+@pytest.mark.parametrize(
+    ("number", "place"), [(signal.SIGINT, "bus"), (signal.SIGTERM, "bus"), (signal.SIGTERM, "unix")]
+)
+def test_interrupted_flight(domain: Domain, number: int, place: str) -> None:
     """The simulator shuts down cleanly, sends END to the controller, and its exit status reports unanswered ticks."""
-    bag = domain.folder / "bag"
-    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=60.0)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=60.0)
+    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **where(domain, place)}
+    controller = domain.start("controller_node", machine=MACHINE, record=bag, **both)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, **both)
     controller.wait_for("ASCENT -> COAST")
     sim.signal(number)
     assert sim.finish() == 128 + number

@@ -237,10 +237,13 @@ def test_shutdown_at_any_moment(domain: Domain, delay_s: float) -> None:
 # ---- several vehicles -----------------------------------------------------------------------------------------------------------
 
 
-def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference) -> None:
+@pytest.mark.parametrize("place", ["bus", "unix"])
+def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference, place: str) -> None:
+    """On the bus at one address, or each on its own socket beside the other's."""
     counter = domain.start("topic_count", topics="[/clock, /one/sim/truth, /two/sim/truth]")
     bags = {name: domain.folder / name for name in ("one", "two")}
-    parameters = {"machine": MACHINE, "timeout_s": 60.0, "wait_for_subscribers": 0}
+    meeting = {"bus": f"unix:{domain.folder}/socket"} if place == "unix" else {}
+    parameters = {"machine": MACHINE, "timeout_s": 60.0, "wait_for_subscribers": 0, **meeting}
     controllers = [
         domain.start("controller_node", "-r", f"__ns:=/{name}", record=bag, **parameters) for name, bag in bags.items()
     ]
@@ -252,6 +255,7 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference) -> 
         duration="8.0",
         timeout_s=60.0,
         wait_for_subscribers=1,
+        **meeting,
     )
     assert sim.finish() == 0 and [c.finish() for c in controllers] == [0, 0], sim.err
     for number, bag in enumerate(bags.values()):

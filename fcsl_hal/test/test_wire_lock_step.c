@@ -190,7 +190,7 @@ static void test_interrupt(void)
     void *accepted = NULL;
     fcsl_external_t *external = listen_here();
     CHECK(pthread_create(&thread, NULL, accept_one, external) == 0);
-    CHECK(fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, &hal, &error) == 0 && hal.open(&hal, &error) == 0);
+    CHECK(fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, WAIT_MS, &hal, &error) == 0 && hal.open(&hal, &error) == 0);
     CHECK(pthread_join(thread, &accepted) == 0 && accepted == external);
     CHECK(pthread_create(&thread, NULL, interrupt_soon, &hal) == 0);
     CHECK(sample_patiently(&hal, 0, &delivered) == FCSL_HAL_CLOSED);

@@ -52,7 +52,7 @@ static int answer_late(void)
     fcsl_hal_t hal;
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     const int failed = named ? fcsl_hal_bus(their_spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, &error)
-                             : fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, &hal, &error);
+                             : fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, WAIT_MS, &hal, &error);
     CHECK(!failed && hal.open(&hal, &error) == 0);
     CHECK(sample_patiently(&hal, 0, &delivered) == FCSL_HAL_OK);
     for (int i = 0; i < PAUSE_MS / LOOK_MS; i++) {

@@ -114,7 +114,7 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
     const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
     const int failed = named ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, timeout_ms, &hal, said)
-                             : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, said);
+                             : fcsl_hal_wire(their_spec, machine, timeout_ms, timeout_ms, &hal, said);
     CHECK(!failed);
     if (hal.open(&hal, said) != 0) {
         hal.close(hal.ctx);

@@ -33,7 +33,7 @@ from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
 from .subjects.requirements import requirement_rows, requirement_times
-from .subjects.ros.main import AXES, DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
+from .subjects.ros.main import AXES, DECIMATE, LOCKSTEP_DECIMATES, LOCKSTEP_PLACES, PICTURE, lockstep, realtime
 from .subjects.set_up import set_up_rows, set_up_times
 from .subjects.simulator.main import simulator_figures, simulator_rows
 from .subjects.start import start_rows, start_times
@@ -93,11 +93,14 @@ def replay_rows(replayed: dict[str, Any]) -> Rows:
 
 
 def lockstep_rows(ticks_per_s: dict[str, float]) -> Rows:
-    rows = [("lock-step over the bus, native programs", f"{ticks_per_s['native']:.0f} ticks/s")]
-    for n in LOCKSTEP_DECIMATES:
-        what = "all published" if n == 1 else f"1 of {n} published"
-        rows.append((f"lock-step of nodes, {what}", f"{ticks_per_s[f'decimate_{n}']:.0f} ticks/s (goal 6000)"))
-    return [*rows, ("    with a subscriber", f"{ticks_per_s['subscribed']:.0f} ticks/s (goal 6000)")]
+    rows = list[tuple[str, str]]()
+    for place in LOCKSTEP_PLACES:
+        rows.append((f"lock-step, {place}, native programs", f"{ticks_per_s[f'{place} native']:.0f} ticks/s"))
+        for n in LOCKSTEP_DECIMATES:
+            what = "all published" if n == 1 else f"1 of {n} published"
+            rows.append((f"    nodes, {what}", f"{ticks_per_s[f'{place} decimate_{n}']:.0f} ticks/s (goal 6000)"))
+        rows.append(("    with a subscriber", f"{ticks_per_s[f'{place} subscribed']:.0f} ticks/s (goal 6000)"))
+    return rows
 
 
 def realtime_rows(sides: dict[str, Any]) -> Rows:

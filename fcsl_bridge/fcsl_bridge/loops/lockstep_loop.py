@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from simclient.ros.lockstep import Lockstep
 
-from ..base.bus_address import endpoint
+from ..base.bus_address import endpoint, peer_address
 from ..diagnostics.machine_status import Figures
 from ..errors import BridgeError
 from ..topics.queue_publisher import NativeThread
@@ -27,7 +27,7 @@ SLICE_MS = 50
 #: How long it looks for a simulator before that.
 _POLL_MS = 500
 #: What the HAL counts, and means trouble (docs/hardware/hal.md).
-_TROUBLES = ("messages_dropped", "messages_late", "bus.wrong_size", "bus.strays", "bus.overflowed")
+_TROUBLES = ("messages_dropped", "messages_late", "bus.wrong_size", "bus.strays", "bus.overflowed", "wire.too_large")
 
 
 class LockstepLoop:
@@ -38,7 +38,7 @@ class LockstepLoop:
     ):
         self._node, self._configured, self._serve_node = node, configured, serve
         self._endpoint = endpoint(options["bus"])
-        where = (f"zenoh:{self._endpoint}", node.get_namespace())
+        where = (peer_address(self._endpoint, node.get_namespace()), node.get_namespace())
         self._lockstep = Lockstep(configured.run, configured.messages, configured.queue_publisher.queue, *where)
         self._native = NativeThread(configured.queue_publisher)
         self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]

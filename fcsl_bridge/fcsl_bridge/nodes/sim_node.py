@@ -84,11 +84,10 @@ class Simulator:
         self._clock_topic = self._queue_publisher.add(self._clock)
         try:
             for name, config in configs.items():
-                # The first vehicle listens, and the others are its clients: all controllers find theirs at one address.
-                address = f"zenoh-client:{self._endpoint}" if self._vehicles else f"zenoh:{self._endpoint}"
                 # Vehicles of one simulation have the same frames: each has a tree of its own.
                 shown = tf.Chosen(tuple(options["tf"] or ()), below(name, "tf") if len(configs) > 1 else tf.TOPIC)
-                how = (options["decimate"], shown, address, options["timeout_s"], self._queue_publisher)
+                place = (self._endpoint, bool(self._vehicles))
+                how = (options["decimate"], shown, *place, options["timeout_s"], self._queue_publisher)
                 self._vehicles.append(Vehicle(node, config, name, *how))
         except BaseException:
             self.close()

@@ -8,13 +8,15 @@ from rclpy.node import Node
 from fcsl_sim.config import SimConfig
 from fcsl_sim.native import Simulation
 
+from ..base.bus_address import peer_address
 from ..topics.queue_publisher import QueuePublisher
 from ..topics.tf import Chosen
 from .sim_topics import SimTopics
 
 
 class Vehicle:
-    """name_space: of its topics, empty for the node's own. address: where its controller finds it, or it the bus."""
+    """name_space: of its topics, empty for the node's own. endpoint: where its controller finds it; `is_client` of the bus
+    there, where another vehicle listens."""
 
     def __init__(
         self,
@@ -23,14 +25,16 @@ class Vehicle:
         name_space: str,
         decimate: int,
         chosen: Chosen,
-        address: str,
+        endpoint: str,
+        is_client: bool,
         timeout_s: float,
         queue_publisher: QueuePublisher,
     ):
         self.name_space = name_space
-        self._config, self._address, self._timeout_ms = config, address, int(1000 * timeout_s)
+        self._config, self._timeout_ms = config, int(1000 * timeout_s)
         inside = node.get_namespace()
         self._keys = name_space if name_space.startswith("/") else f"{inside}/{name_space}"
+        self._address = peer_address(endpoint, self._keys, is_client)
         self.accepted = False
         self.sim = Simulation(config.plan, config.tables)
         self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, chosen, queue_publisher)

@@ -105,12 +105,12 @@ int fcsl_hal_stub(fcsl_hal_t *hal, fcsl_error_t *error);
  * begins anew. "no time message of tick k within timeout_ms ms" ends the run.
  * A rig that sends none leaves the run to the monotonic clock: sample takes the newest message, if one has come since the last
  * tick. A rig that falls silent, or goes, ends nothing; `hal.connected` and the age of the channels tell.
- * Returns 0, or -1 with `error` filled. */
-int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
-                  fcsl_error_t *error);
+ * `open_ms`: how long to look for the other end. Returns 0, or -1 with `error` filled. */
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t open_ms, uint32_t timeout_ms,
+                  fcsl_hal_t *hal, fcsl_error_t *error);
 /* The same over the bus, where each channel has a key (docs/reference/transports.md). `address`: zenoh:tcp:HOST:PORT, where a simulator listens,
  * or zenoh-peer:tcp:HOST:PORT. With ,free-running behind it `open` waits for nobody, the monotonic clock paces the run, and sample
- * takes the newest values that anybody put; that a simulator comes or goes is logged. `name_space`: in front of the keys, or "". `open_ms`: how long to look for the simulator. */
+ * takes the newest values that anybody put; that a simulator comes or goes is logged. `name_space`: in front of the keys, or "". */
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
                  uint32_t timeout_ms, fcsl_hal_t *hal, fcsl_error_t *error);
 /* 0 when `address` has that form, or -1 with `error` filled. */

@@ -77,7 +77,8 @@ int fcsl_wire_check(const char *spec, fcsl_error_t *error);
 const fcsl_wire_counters_t *fcsl_wire_counters(const char *spec);
 
 /* Opens the wire that `spec` names, for messages of up to `message_max` bytes. FCSL_WIRE_CONNECT tries again for `timeout_ms`
- * while nobody listens: two programs may start in either order. Returns 0, or -1 with `error` filled. */
+ * while nobody listens: two programs may start in either order. Returns 0, or with `error` filled -1, or 1 where nobody listened
+ * on a Unix socket all the time. */
 int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, uint32_t timeout_ms, fcsl_wire_t *wire,
                    fcsl_error_t *error);
 

@@ -503,7 +503,7 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, fcsl_error_t *error)
                                                             deadline_ns, &wire, error)
                                      : fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT,
                                                       actuators > hal->inbox_size ? actuators : hal->inbox_size,
-                                                      hal->timeout_ms, &wire, error);
+                                                      hal->open_ms, &wire, error);
     if (failed) {
         return failed;
     }
@@ -552,8 +552,8 @@ static void fill_fields(hal_t *hal, const fcsl_wire_counters_t *of_wire)
     }
 }
 
-static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machine, uint32_t timeout_ms,
-                fcsl_hal_t *handle, fcsl_error_t *error)
+static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machine, uint32_t open_ms,
+                uint32_t timeout_ms, fcsl_hal_t *handle, fcsl_error_t *error)
 {
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     hal_t *hal = calloc(1, sizeof *hal);
@@ -571,7 +571,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         return fcsl_fail(error, "out of memory for the wire, or it counts too much");
     }
     hal->table = fcsl_channel_table(machine);
-    hal->open_ms = timeout_ms;
+    hal->open_ms = open_ms;
     hal->timeout_ms = timeout_ms;
     fill_fields(hal, of_wire);
     *handle = (fcsl_hal_t){
@@ -596,8 +596,8 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
     return 0;
 }
 
-int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
-                  fcsl_error_t *error)
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t open_ms, uint32_t timeout_ms,
+                  fcsl_hal_t *hal, fcsl_error_t *error)
 {
     if (fcsl_wire_check(spec, error) != 0) {
         return -1;
@@ -605,7 +605,7 @@ int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t time
     if (strlen(spec) >= SPEC_BYTES) {
         return fcsl_fail(error, "the wire's name is too long: %d bytes are possible", SPEC_BYTES - 1);
     }
-    if (make(fcsl_wire_counters(spec), machine, timeout_ms, hal, error) != 0) {
+    if (make(fcsl_wire_counters(spec), machine, open_ms, timeout_ms, hal, error) != 0) {
         return -1;
     }
     (void)snprintf(((hal_t *)hal->ctx)->spec, SPEC_BYTES, "%s", spec);
@@ -631,14 +631,13 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
     if (strlen(address) >= SPEC_BYTES || strlen(name_space) >= SPEC_BYTES) {
         return fcsl_fail(error, "the address or the namespace is too long: %d bytes are possible", SPEC_BYTES - 1);
     }
-    if (make(&fcsl_wire_named_counters, machine, timeout_ms, hal, error) != 0) {
+    if (make(&fcsl_wire_named_counters, machine, open_ms, timeout_ms, hal, error) != 0) {
         return -1;
     }
     hal_t *self = hal->ctx;
     self->is_named = 1;
     self->runs_free = fcsl_wire_runs_free(address);
     self->presence = presence_of(FCSL_WIRE_LISTEN, &self->table, &self->log);
-    self->open_ms = open_ms;
     (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
     (void)snprintf(self->name_space, SPEC_BYTES, "%s", name_space);
     return 0;
@@ -647,7 +646,7 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
                        fcsl_error_t *error)
 {
-    if (make(wire->counters, machine, timeout_ms, hal, error) != 0) {
+    if (make(wire->counters, machine, timeout_ms, timeout_ms, hal, error) != 0) {
         return -1;
     }
     ((hal_t *)hal->ctx)->wire = *wire;

@@ -179,6 +179,7 @@ static void unix_count(void *ctx, void *values)
     memcpy(values, &((const wire_t *)ctx)->counters, sizeof(counters_t));
 }
 
+/* 0, 1 where nobody was there until then, or -1. */
 static int connect_until(wire_t *wire, uint64_t deadline_ns, fcsl_error_t *error)
 {
     for (;;) {
@@ -192,7 +193,7 @@ static int connect_until(wire_t *wire, uint64_t deadline_ns, fcsl_error_t *error
     if (wire->fd >= 0 && size_buffer(wire->fd, wire->message_max) != 0) {
         return fcsl_fail(error, "cannot make room for a message in the socket: %s", strerror(errno));
     }
-    return wire->fd >= 0 ? 0 : -1;
+    return wire->fd >= 0 ? 0 : 1;
 }
 
 int fcsl_wire_open_unix(const char *path, fcsl_wire_side_t side, size_t message_max, uint64_t deadline_ns,
@@ -206,12 +207,16 @@ int fcsl_wire_open_unix(const char *path, fcsl_wire_side_t side, size_t message_
     self->fd = -1;
     self->message_max = message_max;
     (void)snprintf(self->path, sizeof self->path, "%s", path); /* a longer one does not open */
+    int failed = 0;
     if (side == FCSL_WIRE_LISTEN) {
         self->listener = fcsl_socket_listen(path, SOCK_SEQPACKET, BACKLOG, error);
+        failed = self->listener < 0 ? -1 : 0;
+    } else {
+        failed = connect_until(self, deadline_ns, error);
     }
-    if (side == FCSL_WIRE_LISTEN ? self->listener < 0 : connect_until(self, deadline_ns, error) != 0) {
+    if (failed) {
         unix_close(self);
-        return -1;
+        return failed;
     }
     *wire = (fcsl_wire_t){
         .ctx = self,

@@ -72,7 +72,7 @@ static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t 
         return fcsl_hal_stub(hal, error);
     }
     if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
-        return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error);
+        return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, timeout_ms, hal, error);
     }
     if (options_hal_is_linux(options)) {
         return hal_linux(peer + strlen(OPTIONS_LINUX), priority_of_devices(options), run, hal, error);

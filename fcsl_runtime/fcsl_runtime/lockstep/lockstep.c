@@ -96,14 +96,24 @@ void fcsl_lockstep_free(fcsl_lockstep_t *lockstep)
 
 /* ---- meeting and parting ------------------------------------------------------------------------------------------------ */
 
+static int make_hal(fcsl_lockstep_t *lockstep, uint32_t wait_ms, uint32_t timeout_ms, fcsl_error_t *error)
+{
+    static const char WIRE[] = "wire:";
+    const size_t prefix = sizeof WIRE - 1u;
+    const char *address = lockstep->address;
+    return strncmp(address, WIRE, prefix) == 0
+               ? fcsl_hal_wire(address + prefix, lockstep->machine, wait_ms, timeout_ms, &lockstep->hal, error)
+               : fcsl_hal_bus(address, lockstep->name_space, lockstep->machine, wait_ms, timeout_ms, &lockstep->hal,
+                              error);
+}
+
 int fcsl_lockstep_connect(fcsl_lockstep_t *lockstep, uint32_t wait_ms, uint32_t timeout_ms, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &lockstep->hal;
     if (lockstep->connected) {
         fcsl_lockstep_leave(lockstep);
     }
-    if (!lockstep->looks && fcsl_hal_bus(lockstep->address, lockstep->name_space, lockstep->machine, wait_ms,
-                                         timeout_ms, hal, error) != 0) {
+    if (!lockstep->looks && make_hal(lockstep, wait_ms, timeout_ms, error) != 0) {
         return -1;
     }
     lockstep->looks = 1;

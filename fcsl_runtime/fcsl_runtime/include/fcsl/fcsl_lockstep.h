@@ -16,7 +16,7 @@ extern "C" {
 
 typedef struct fcsl_lockstep fcsl_lockstep_t;
 
-/* `address`, `name_space`: as fcsl_hal_bus takes them. `topics` may be null. Run, topics and queue must outlive it. */
+/* `address`: wire:SPEC (fcsl_wire.h), or as fcsl_hal_bus takes it and `name_space`. `topics` may be null. Run, topics and queue must outlive it. */
 fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_publish_queue_t *queue,
                                    const char *address, const char *name_space, fcsl_error_t *error);
 /* Leaves the simulator, too. */

@@ -38,7 +38,8 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 class Lockstep:
-    """`address`: zenoh:tcp:HOST:PORT, where a simulator listens; name_space: in front of its keys. Raises TwinError."""
+    """`address`: zenoh:tcp:HOST:PORT or wire:unix:PATH, where a simulator listens; name_space: in front of the keys on
+    the bus. Raises TwinError."""
 
     def __init__(self, run: Run, topics: RunTopics, queue: PublishQueue, address: str, name_space: str = ""):
         self._library, self._error = _load(runtime_library().with_name(_LIBRARY)), CError()

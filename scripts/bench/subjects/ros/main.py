@@ -42,6 +42,8 @@ AXES = sized(20, 2)
 #: 1 of 20 ticks is published: 50 Hz.
 DECIMATE = 20
 LOCKSTEP_DECIMATES = (100, 1)
+#: Where the nodes meet: on the bus, whose port follows from the domain, or on a Unix socket.
+LOCKSTEP_PLACES = {"bus": "", "unix": f"unix:{OUT}/socket"}
 LOCKSTEP_ROUNDS = sized(3, 1)
 #: Edges of the latency histogram in microseconds, for the picture.
 EDGES_US = np.geomspace(20, 20_000, 61)
@@ -172,13 +174,18 @@ def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
 
 
 def lockstep() -> dict[str, Any]:
-    """Ticks per second of the lander in lock-step over the bus: of two native programs, and of sim_node and controller_node by how
-    many ticks share one publication, and with a subscriber. They take turns; medians."""
+    """Ticks per second of the lander in lock-step, over the bus and over a Unix socket: of two native programs, and of sim_node and
+    controller_node by how many ticks share one publication, and with a subscriber. They take turns; medians. Keys like
+    `unix decimate_1`."""
     with own_domain() as domain:
         env = environment(domain)
-        ways: dict[str, Callable[[], float]] = {"native": lambda: _fly_native(f"zenoh:tcp:127.0.0.1:{7500 + domain}")}
-        ways |= {f"decimate_{n}": functools.partial(_fly, n, env) for n in LOCKSTEP_DECIMATES}
-        ways["subscribed"] = lambda: _fly_subscribed(env)
+        OUT.mkdir(parents=True, exist_ok=True)
+        native = {"bus": f"zenoh:tcp:127.0.0.1:{7500 + domain}", "unix": f"wire:{LOCKSTEP_PLACES['unix']}"}
+        ways: dict[str, Callable[[], float]] = {}
+        for name, place in LOCKSTEP_PLACES.items():
+            ways[f"{name} native"] = functools.partial(_fly_native, native[name])
+            ways |= {f"{name} decimate_{n}": functools.partial(_fly, n, env, place) for n in LOCKSTEP_DECIMATES}
+            ways[f"{name} subscribed"] = functools.partial(_fly_subscribed, env, place)
         rounds = [{name: fly() for name, fly in ways.items()} for _ in range(LOCKSTEP_ROUNDS)]
     return {name: statistics.median(found[name] for found in rounds) for name in ways}
 
@@ -194,7 +201,7 @@ def _fly_native(place: str) -> float:
     return float(said["ticks"] / said["wall_s"])
 
 
-def _fly_subscribed(env: dict[str, str]) -> float:
+def _fly_subscribed(env: dict[str, str], place: str) -> float:
     topics = "topics:=[/clock, /sim/truth, /odom, /lander_control/engine, /lander_control/filter]"
     executable = package_prefix("fcsl_bridge") / "lib/fcsl_bridge/topic_count"
     line = [str(executable), "--ros-args", "-p", topics]
@@ -202,14 +209,15 @@ def _fly_subscribed(env: dict[str, str]) -> float:
         try:
             assert listening.stderr is not None
             listening.stderr.readline()  # it waits for topics
-            return _fly(1, env)
+            return _fly(1, env, place)
         finally:
             listening.kill()
 
 
-def _fly(decimate: int, env: dict[str, str]) -> float:
-    sim = _node("sim_node", sim="package://lander/sim/lander.sim.json", seed=1, decimate=decimate)
-    controller = _node("controller_node", machine="lander/lander_control", decimate=decimate)
+def _fly(decimate: int, env: dict[str, str], place: str) -> float:
+    both: dict[str, Any] = {"decimate": decimate} | ({"bus": place} if place else {})
+    sim = _node("sim_node", sim="package://lander/sim/lander.sim.json", seed=1, **both)
+    controller = _node("controller_node", machine="lander/lander_control", **both)
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
     with subprocess.Popen(controller, **pipes) as answering:
         flown = subprocess.run(sim, capture_output=True, text=True, env=env, timeout=LIMIT_S)
