@@ -327,6 +327,37 @@ def test_stamps_of_another_clock_are_told(robot: Robot, stamp_ns: int, direction
     assert robot.end() == 0
 
 
+@pytest.mark.parametrize(
+    ("ahead_s", "said"),
+    [
+        (
+            18,
+            "stamped 18 s after the time of this node, which is that of the system's clock: its sender has another clock "
+            "(GPS and UTC are so far apart)",
+        ),
+        (
+            -37,
+            "stamped 37 s before the time of this node, which is that of the system's clock: its sender has another clock "
+            "(TAI and UTC are so far apart)",
+        ),
+    ],
+)
+def test_a_sensor_on_another_time_scale_is_told(robot: Robot, ahead_s: int, said: str) -> None:
+    """A driver that stamps with a GNSS receiver's time, or a computer that is set to TAI."""
+    while said not in robot.process.err:
+        robot.sense(1.0, time.time_ns() + ahead_s * NS)
+        time.sleep(1 / HZ)
+        assert robot.process.process.poll() is None
+    assert robot.end() == 0
+
+
+def test_a_sensor_that_is_late_is_of_no_other_clock(robot: Robot) -> None:
+    for _ in range(4 * HZ):  # the node looks once a second
+        robot.sense(1.0, time.time_ns() - 10 * NS)
+        time.sleep(1 / HZ)
+    assert robot.end() == 0 and "another clock" not in robot.process.err
+
+
 def test_a_second_publisher_of_a_sensor_is_told(robot: Robot) -> None:
     robot.listener.node.create_publisher(Imu, "/imu/data", qos.STREAM)
     while "hal.imu/data has several publishers" not in robot.client.diagnosed()[0]["rig"].message:

@@ -10,6 +10,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from simclient.clock_offsets import named_offset
 from simclient.ros import frame_names
 from simclient.ros.publish_queue import RunTopics
 from simclient.ros.topics import RosTopic, SampleInput, composer_of, sources_of, topics_of
@@ -66,16 +67,18 @@ class Inputs:
         return self._counts(lambda reason: reason not in _HARMLESS) | contested
 
     def warn_of_other_clocks(self, clock: str) -> None:
-        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`, at two calls in succession:
-        a clock may have been set between them."""
+        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`, or as far as one time scale
+        from another, at two calls in succession: a clock may have been set between them."""
         for one in self._inputs:
-            one.odd = one.odd + 1 if abs(one.behind_ns) > _OTHER_CLOCK_NS else 0
+            scales = named_offset(one.behind_ns)
+            one.odd = one.odd + 1 if scales or abs(one.behind_ns) > _OTHER_CLOCK_NS else 0
             if one.odd == 2 and not one.warned:
                 one.warned = True
                 direction = "before" if one.behind_ns > 0 else "after"
+                named = f" ({scales.partition(' (')[0]} are so far apart)" if scales else ""
                 self._node.get_logger().warning(
                     f"{one.name}: stamped {abs(one.behind_ns) / 1e9:.0f} s {direction} the time of this node, which is "
-                    f"that of {clock}: its sender has another clock"
+                    f"that of {clock}: its sender has another clock{named}"
                 )
 
     def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:

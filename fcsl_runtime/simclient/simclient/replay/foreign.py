@@ -11,6 +11,7 @@ import numpy as np
 
 from ..bag import Bag
 from ..c_run import CSeries
+from ..clock_offsets import named_offset
 from ..descriptor import Channel, Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..paths import split_path
@@ -45,10 +46,6 @@ _ODD = {
     "jumps_ahead": f"jumps ahead of more than {JUMP_NS // 10**9} s",
     "headerless": "without a header (placed by the time of recording)",
 }
-
-
-#: Offsets between clocks in s, since 2017.
-_CLOCKS_S = {18: "GPS and UTC (18 s)", 37: "TAI and UTC (37 s)", 19: "TAI and GPS (19 s)"}
 
 
 @dataclass(frozen=True)
@@ -136,11 +133,11 @@ def _clocks(offsets_ns: Mapping[str, int]) -> list[str]:
     """
     found = []
     for topic, offset_ns in offsets_ns.items():
-        known = [text for s, text in _CLOCKS_S.items() if abs(abs(offset_ns) - s * 10**9) < JUMP_NS // 2]
+        known = named_offset(offset_ns)
         apart = max(abs(offset_ns - other) for other in offsets_ns.values()) > JUMP_NS
         if abs(offset_ns) > JUMP_NS and (known or apart):
             way = "ahead of" if offset_ns > 0 else "behind"
-            why = f", the offset of {known[0]}" if known else "; those of other topics are not: is it another clock?"
+            why = f", the offset of {known}" if known else "; those of other topics are not: is it another clock?"
             found.append(f"{topic}: stamps {abs(offset_ns) / 1e9:.3f} s {way} the times of recording{why}")
     return found
 
