@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--ros`: a machine in a ROS 2 graph by zenoh-plugin-ros2dds, seen as the bridge sees it (docs/reference/transports.md).
+"""`--ros`: a machine in a ROS 2 graph by zenoh-plugin-ros2dds or rmw_zenoh, seen as these see it (docs/reference/transports.md).
 
-Here a Zenoh session of Python stands for the bridge; `make interop` has the plugin itself.
+Here Zenoh sessions of Python stand for the bridge, and for the router and a node of rmw_zenoh; `make interop` has the plugin
+itself.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import queue
 import re
 import signal
+import struct
 import subprocess
 import time
 from collections import defaultdict
@@ -19,6 +21,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import pytest
 import zenoh
 from ament_index_python.packages import get_package_share_directory
 from geometry_msgs.msg import PointStamped, PoseWithCovarianceStamped, TwistStamped
@@ -169,6 +172,122 @@ def test_topics_of_a_flight_computer() -> None:
     assert second.tick == first.tick + 1
     stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in (first, second)]
     assert begun_s < stamps[0] < stamps[1] < time.time()
+
+
+DOMAIN = 7
+#: Of an endpoint: session, number in its node, kind, namespace, node, topic, type, hash, quality of service.
+NODE_TOKEN = re.compile(rf"@ros2_lv/{DOMAIN}/(\w+)/0/0/NN/%/([^/]+)/([^/]+)")
+RMW_TOKEN = re.compile(
+    rf"@ros2_lv/{DOMAIN}/(\w+)/0/(\d+)/(M[PS])/%/([^/]+)/([^/]+)/([^/]+)/([^/]+)/(RIHS01_[0-9a-f]{{64}})/([^/]+)"
+)
+
+
+@contextlib.contextmanager
+def node_of_rmw_zenoh(endpoint: str) -> Iterator[zenoh.Session]:
+    """A session behind a router that listens there."""
+    at = json.dumps([zenoh_locator(endpoint)])
+    quiet = "scouting: {multicast: {enabled: false}, gossip: {enabled: false}}"
+    router = zenoh.Config.from_json5(f'{{mode: "router", listen: {{endpoints: {at}}}, {quiet}}}')
+    node = zenoh.Config.from_json5(f'{{mode: "client", connect: {{endpoints: {at}}}, {quiet}}}')
+    with zenoh.open(router), zenoh.open(node) as session:
+        yield session
+
+
+def rmw_key(topic: str, kind: str) -> str:
+    package, _, name = kind.split("/")
+    return f"{DOMAIN}/{topic}/{package}::msg::dds_::{name}_/{installed_hash(kind)}"
+
+
+def attached(sample: zenoh.Sample) -> tuple[int, int, bytes]:
+    """Number, time and GID, as rmw_zenoh requires them."""
+    number, time_ns, size, gid = struct.unpack("<qqB16s", bytes(sample.attachment or b""))
+    assert size == 16
+    return number, time_ns, gid
+
+
+def test_topics_among_nodes_of_rmw_zenoh(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    endpoint = free_endpoint()
+    options = [
+        "--ros",
+        f"rmw_zenoh:{zenoh_locator(endpoint)}",
+        "--namespace",
+        "/r1/",
+        "--speed",
+        "2",
+        "--duration",
+        "4",
+    ]
+    came: queue.Queue[zenoh.Sample] = queue.Queue()
+    latched: queue.Queue[zenoh.Sample] = queue.Queue()
+    descent = rmw_key("r1/lander_control/descent", "lander/msg/LanderControlDescent")
+    with node_of_rmw_zenoh(endpoint) as node, started("fcsl-sim", "run", SIM, *options) as sim:
+        subscriber = node.declare_subscriber(descent, came.put)
+        samples = [came.get(timeout=LONG_S) for _ in range(10)]
+        seen = [str(reply.ok.key_expr) for reply in node.liveliness().get(f"@ros2_lv/{DOMAIN}/**") if reply.ok]
+        history = HistoryConfig(detect_late_publishers=True, max_samples=1)
+        state_key = rmw_key("r1/lander_control/state", "fcsl_msgs/msg/MachineState")
+        late = declare_advanced_subscriber(node, state_key, latched.put, history=history)
+        state = latched.get(timeout=LONG_S)
+        late.undeclare()
+        subscriber.undeclare()
+        _, complaint = sim.communicate(timeout=LONG_S)
+    assert sim.returncode == 1, complaint  # it ends before it has landed
+
+    messages = [read(sample, LanderControlDescent) for sample in samples]
+    assert [m.tick for m in messages] == list(range(messages[0].tick, messages[0].tick + 10))
+    numbers, times, gids = zip(*map(attached, samples), strict=True)
+    assert list(numbers) == list(range(1, 11)) and list(times) == sorted(times)
+    assert abs(times[0] - time.time_ns()) < LONG_S * 10**9
+    assert read(state, MachineState).state == "ASCENT" and attached(state)[0] == 1
+    assert len({*gids, attached(state)[2]}) == 2, "one for each publisher"
+
+    (alone,) = [found for token in seen if (found := NODE_TOKEN.fullmatch(token))]
+    assert alone[2] == "%r1" and alone[3] == "lander_control"
+    endpoints = [found for token in seen if (found := RMW_TOKEN.fullmatch(token))]
+    assert len(endpoints) == len(seen) - 1 and {found[1] for found in endpoints} == {alone[1]}
+    assert sorted(int(found[2]) for found in endpoints) == list(range(1, len(endpoints) + 1))
+    assert {found[3] for found in endpoints} == {"MP"}
+    topics = {found[6].replace("%", "/"): found for found in endpoints}
+    wanted = {"transitions", "state", "health", "faults", *INSTANCES}
+    assert set(topics) == {"/clock"} | {f"/r1/lander_control/{name}" for name in wanted}
+    assert topics["/r1/lander_control/state"][9] == ":1:,1:,:,:,,"  # transient local, depth 1
+    assert topics["/clock"][9] == "::,2000:,:,:,,"
+    for found in endpoints:
+        package, name = found[7].split("::msg::dds_::")
+        assert found[8] == installed_hash(f"{package}/msg/{name.removesuffix('_')}")
+
+
+def test_a_hal_among_nodes_of_rmw_zenoh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A message without an attachment is taken, too: the machine needs nothing of it."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    endpoint = free_endpoint()
+    subprocess.run(["fcslc", "build", ECHO, "-o", tmp_path], check=True)
+    options = ["--hal", f"ros:rmw_zenoh:{zenoh_locator(endpoint)}", "--namespace", "r1"]
+    commands: queue.Queue[zenoh.Sample] = queue.Queue()
+    sensor = rmw_key("r1/imu/data", "sensor_msgs/msg/Imu")
+    with node_of_rmw_zenoh(endpoint) as node, started("fcsl-fc", tmp_path / "libecho.so", *options) as fc:
+        subscriber = node.declare_subscriber(rmw_key("r1/cmd_vel", "geometry_msgs/msg/TwistStamped"), commands.put)
+        sample = commands.get(timeout=LONG_S)
+        for attachment in (struct.pack("<qqB16s", 1, time.time_ns(), 16, bytes(16)), None):
+            rate = read(sample, TwistStamped).twist.linear.x + 1.0
+            while read(sample, TwistStamped).twist.linear.x != rate:
+                node.put(sensor, imu(rate, time.time_ns()), attachment=attachment)
+                sample = commands.get(timeout=LONG_S)
+        assert attached(sample)[0] > 1
+        subscriber.undeclare()
+        fc.send_signal(signal.SIGTERM)
+        _, complaint = fc.communicate(timeout=LONG_S)
+    assert fc.returncode == 0, complaint
+
+
+def test_without_a_router_of_rmw_zenoh(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = ["fcsl-fc", LIBRARY, "--machine", "lander_control", "--ros", f"rmw_zenoh:{zenoh_locator(free_endpoint())}"]
+    found = subprocess.run(line, capture_output=True, text=True, timeout=LONG_S, check=False)
+    assert found.returncode == 1 and "no ROS 2 graph: cannot connect to tcp/127.0.0.1:" in found.stderr
+    monkeypatch.setenv("ROS_DOMAIN_ID", "233")
+    found = subprocess.run(line, capture_output=True, text=True, timeout=LONG_S, check=False)
+    assert found.returncode == 1 and "ROS_DOMAIN_ID is '233'; it is a number from 0 to 232" in found.stderr
 
 
 def test_a_command_is_told_while_the_flight_computer_is_paused(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ int fcsl_zenoh_open(const char *path, const char *config, const fcsl_zenoh_event
 }
 
 int fcsl_zenoh_declare_output(fcsl_zenoh_t *session, uint32_t number, const char *key, int droppable, int latched,
-                              char *error, size_t error_size)
+                              int attaches, char *error, size_t error_size)
 {
     return -1;
 }

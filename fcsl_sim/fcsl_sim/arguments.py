@@ -163,8 +163,11 @@ def _add_servers(command: argparse.ArgumentParser) -> None:
         "put the values of all channels on a bus of their own (docs/reference/transports.md), which listens there"
     )
     command.add_argument("--observers", metavar="tcp:HOST:PORT", help=help_observers)
-    help_ros = "publish the machine's ROS 2 topics and /clock through a bridge (docs/reference/transports.md), for which it listens there"
-    command.add_argument("--ros", metavar="tcp:HOST:PORT", help=help_ros)
+    help_ros = (
+        "publish the machine's ROS 2 topics and /clock: tcp:HOST:PORT, to listen on for a bridge of DDS, or "
+        "rmw_zenoh:tcp/HOST:PORT, the router of rmw_zenoh (docs/reference/transports.md)"
+    )
+    command.add_argument("--ros", metavar="ADDRESS", help=help_ros)
 
 
 def _add_plot(command: argparse.ArgumentParser) -> None:

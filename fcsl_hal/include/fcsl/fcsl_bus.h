@@ -63,6 +63,7 @@ typedef struct {
     int connects_later; /* of those that connect: fcsl_bus_open does not wait, and the session connects when somebody listens. All
                            that stands here must outlive it */
     int observer; /* messages of this session give way to all others, and are dropped where a receiver is slow */
+    int attaches; /* beside each message stand its number, the system's time and the publisher's GID, as rmw_zenoh requires */
     uint32_t ring_bytes; /* for what is posted and not yet put; a message may take half of it */
     const char *const *outputs;
     uint32_t output_count;

@@ -3,8 +3,10 @@
 
 use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{sync_channel, SyncSender};
 use std::sync::{Arc, Mutex};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
@@ -13,6 +15,7 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::session::ZenohId;
 use zenoh::time::{Timestamp, NTP64};
 use zenoh::{Config, Session, Wait};
 
@@ -86,12 +89,51 @@ fn start_replier() -> Result<SyncSender<Reply>, std::io::Error> {
     Ok(sender)
 }
 
-/// The last message of a latched output, with its time: by that a subscriber knows a message that it has got already.
-type Latch = Arc<Mutex<Option<(ZBytes, Timestamp)>>>;
+/// A message, with its time: by that a subscriber knows a message that it has got already.
+#[derive(Clone)]
+struct Kept {
+    bytes: ZBytes,
+    time: Timestamp,
+    attachment: Option<ZBytes>,
+}
+
+/// The last message of a latched output.
+type Latch = Arc<Mutex<Option<Kept>>>;
+
+/// What the messages of a publisher of rmw_zenoh have beside them.
+struct Attachment {
+    /// Of this publisher alone.
+    gid: [u8; GID_BYTES],
+    /// Messages so far.
+    count: AtomicI64,
+}
+
+const GID_BYTES: usize = 16;
+
+impl Attachment {
+    fn new(session: ZenohId, number: u32) -> Self {
+        let id = u128::from_le_bytes(session.to_le_bytes()) ^ (u128::from(number) + 1);
+        Self { gid: id.to_le_bytes(), count: AtomicI64::new(0) }
+    }
+
+    /// Of the next message: its number, from 1 on, the system's time in ns, and the GID behind its length; little-endian.
+    fn next(&self) -> ZBytes {
+        let number = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let now_ns = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+        let mut bytes = Vec::with_capacity(17 + GID_BYTES);
+        bytes.extend_from_slice(&number.to_le_bytes());
+        bytes.extend_from_slice(&now_ns.to_le_bytes());
+        bytes.push(GID_BYTES as u8);
+        bytes.extend_from_slice(&self.gid);
+        ZBytes::from(bytes)
+    }
+}
 
 struct Output {
     publisher: Publisher<'static>,
     latch: Option<Latch>,
+    attachment: Option<Attachment>,
 }
 
 pub struct Zenoh {
@@ -114,9 +156,9 @@ fn reason_of(error: zenoh::Error) -> Reason {
 }
 
 /// `now`, or the next instant after the last message: subscribers drop what is older, and a system's clock may be set back.
-fn later(now: Timestamp, last: Option<&(ZBytes, Timestamp)>) -> Timestamp {
+fn later(now: Timestamp, last: Option<&Kept>) -> Timestamp {
     match last {
-        Some((_, last)) if now <= *last => Timestamp::new(NTP64(last.get_time().0 + 1), *last.get_id()),
+        Some(Kept { time, .. }) if now <= *time => Timestamp::new(NTP64(time.get_time().0 + 1), *time.get_id()),
         _ => now,
     }
 }
@@ -144,7 +186,7 @@ impl Zenoh {
         Ok(replier)
     }
 
-    fn declare_output(&mut self, number: u32, key: &str, droppable: bool) -> Result<(), zenoh::Error> {
+    fn declare_output(&mut self, number: u32, key: &str, droppable: bool, attaches: bool) -> Result<(), zenoh::Error> {
         let (control, priority) = if droppable {
             (CongestionControl::Drop, Priority::DEFAULT)
         } else {
@@ -164,7 +206,8 @@ impl Zenoh {
             .callback(move |status| events.matching(number, status.matching()))
             .background()
             .wait()?;
-        self.outputs.push(Output { publisher: output, latch: None });
+        let attachment = attaches.then(|| Attachment::new(self.session.zid(), number));
+        self.outputs.push(Output { publisher: output, latch: None, attachment });
         Ok(())
     }
 
@@ -180,10 +223,11 @@ impl Zenoh {
         let kept = latch.clone();
         let callback = move |query: Query| {
             let last = kept.lock().ok().and_then(|last| last.clone());
-            if let Some((bytes, time)) = last {
+            if let Some(Kept { bytes, time, attachment }) = last {
                 let answer = answer.clone();
                 let _ = replier.try_send(Box::new(move || {
-                    let _ = query.reply(&answer, bytes).timestamp(time).wait(); // refused for a query of its own key alone
+                    let reply = query.reply(&answer, bytes).timestamp(time).attachment(attachment);
+                    let _ = reply.wait(); // refused for a query of its own key alone
                 }));
             }
         };
@@ -274,13 +318,16 @@ impl Zenoh {
 
     fn put(&self, output: u32, bytes: &[u8]) -> Result<(), Reason> {
         let output = self.outputs.get(output as usize).ok_or("there is no such output")?;
-        let Some(latch) = &output.latch else { return output.publisher.put(bytes).wait().map_err(reason_of) };
+        let attachment = output.attachment.as_ref().map(Attachment::next);
+        let Some(latch) = &output.latch else {
+            return output.publisher.put(bytes).attachment(attachment).wait().map_err(reason_of);
+        };
         let bytes = ZBytes::from(bytes);
         let mut last = latch.lock().map_err(|_| "a message is being kept")?;
         let time = later(self.session.new_timestamp(), last.as_ref());
-        *last = Some((bytes.clone(), time));
+        *last = Some(Kept { bytes: bytes.clone(), time, attachment: attachment.clone() });
         drop(last);
-        output.publisher.put(bytes).timestamp(time).wait().map_err(reason_of)
+        output.publisher.put(bytes).attachment(attachment).timestamp(time).wait().map_err(reason_of)
     }
 
     fn peers(&self) -> usize {
@@ -358,13 +405,14 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_output(
     key: *const c_char,
     droppable: i32,
     latched: i32,
+    attaches: i32,
     error: *mut c_char,
     error_size: usize,
 ) -> i32 {
     // SAFETY: the header's contract.
     unsafe {
         declare(zenoh, key, error, error_size, |zenoh, key| {
-            zenoh.declare_output(number, key, droppable != 0)?;
+            zenoh.declare_output(number, key, droppable != 0, attaches != 0)?;
             if latched != 0 {
                 zenoh.latch_output()?;
             }

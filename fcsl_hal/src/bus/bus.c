@@ -188,7 +188,7 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_erro
     }
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
         failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, i < options->latched_count,
-                                           error->text, sizeof error->text);
+                                           options->attaches, error->text, sizeof error->text);
     }
     for (uint32_t i = 0; i < options->answer_count && !failed; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];

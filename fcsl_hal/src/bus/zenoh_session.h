@@ -31,9 +31,9 @@ int fcsl_zenoh_open(const char *path, const char *config, const fcsl_zenoh_event
 
 /* Declares a key to put on. The declarations are numbered from 0, and so are those of each kind below. `droppable` messages
  * give way when a receiver is slow, others make fcsl_zenoh_put wait. Of a `latched` one Zenoh's advanced subscribers get the last
- * message when they come later. */
+ * message when they come later. Beside the messages of one that `attaches` stands what rmw_zenoh puts there. */
 int fcsl_zenoh_declare_output(fcsl_zenoh_t *session, uint32_t number, const char *key, int droppable, int latched,
-                              char *error, size_t error_size);
+                              int attaches, char *error, size_t error_size);
 
 /* Calls `sample` for what other sessions put on keys that `key` (an expression) includes. */
 int fcsl_zenoh_declare_input(fcsl_zenoh_t *session, uint32_t number, const char *key, char *error, size_t error_size);

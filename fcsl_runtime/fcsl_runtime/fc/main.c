@@ -358,7 +358,7 @@ static void announce(const program_t *program)
         log_info("observers on %s", program->options.observers);
     }
     if (program->options.ros != NULL) {
-        log_info("ROS 2 topics for a bridge on %s", program->options.ros);
+        log_info("ROS 2 topics on %s", program->options.ros);
     }
     if (program->options.record != NULL) {
         log_info("recording to %s", program->options.record);

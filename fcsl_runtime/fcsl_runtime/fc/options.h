@@ -30,7 +30,7 @@ typedef struct {
     const char *telemetry; /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
     const char *observers; /* tcp:HOST:PORT to listen on; null: none */
-    const char *ros; /* tcp:HOST:PORT to listen on for a bridge to ROS 2; null: none */
+    const char *ros; /* the endpoint of fcsl_ros_graph_options_t; null: none */
     const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     const char *record_split; /* null: one file */

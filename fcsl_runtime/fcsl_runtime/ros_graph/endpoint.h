@@ -1,12 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A publisher or subscription as zenoh-plugin-ros2dds sees it: its key, and the liveliness token that announces it.
+ * A publisher or subscription in a ROS 2 graph: its key on Zenoh, and the liveliness token that announces it, as the
+ * middleware of the graph reads them.
  */
 #ifndef FCSL_ROS_GRAPH_ENDPOINT_H
 #define FCSL_ROS_GRAPH_ENDPOINT_H
 
 #include "fcsl/fcsl_bus.h"
-#include "fcsl/fcsl_run.h"
+
+typedef enum {
+    ROS_BY_BRIDGE, /* of DDS: zenoh-plugin-ros2dds connects to us */
+    ROS_BY_RMW_ZENOH /* nodes of rmw_zenoh: we connect to their router */
+} ros_middleware_t;
+
+/* A graph, and this host in it. */
+typedef struct {
+    ros_middleware_t middleware;
+    fcsl_bus_role_t role;
+    const char *address;    /* of the session: tcp:HOST:PORT */
+    const char *name_space; /* may have slashes around it, or be "" */
+    const char *node;
+    unsigned domain;
+} ros_place_t;
+
+/* Most bytes of a session's tokens, one for each endpoint, and one more. */
+typedef char ros_token_t[FCSL_BUS_TOKEN_MAX + 1];
 
 typedef enum { ROS_PUBLISHER, ROS_SUBSCRIPTION } ros_endpoint_kind_t;
 
@@ -19,13 +37,22 @@ typedef struct {
     unsigned depth;
 } ros_quality_t;
 
-/* The key of topic `name` ("imu/data"; "/clock" is outside of the namespace), behind `machine` if that is not null. The namespace
- * may have slashes around it. Returns 0, or -1 with `error`. */
-int ros_key_write(char key[FCSL_BUS_KEY_MAX + 1], const char *name_space, const char *machine, const char *name,
-                  fcsl_error_t *error);
+typedef struct {
+    char key[FCSL_BUS_KEY_MAX + 1];
+    ros_token_t token;
+} ros_endpoint_t;
 
-/* The token of an endpoint of the topic with that key. */
-int ros_token_write(char token[FCSL_BUS_TOKEN_MAX + 1], const char *key, const ros_quality_t *quality,
-                    fcsl_error_t *error);
+/* `address`: tcp:HOST:PORT to listen on for a bridge, or rmw_zenoh:tcp/HOST:PORT, whose domain is that of ROS_DOMAIN_ID, or 0.
+ * The place keeps all three texts. Returns 0, or -1 with `error`. */
+int ros_place_read(ros_place_t *place, const char *address, const char *name_space, const char *node,
+                   fcsl_error_t *error);
+
+/* The endpoint of topic `name` ("imu/data"; "/clock" is outside of the namespace), behind `machine` if that is not null. `number`: of it
+ * in its session, from 0. Returns 0, or -1 with `error`. */
+int ros_endpoint_write(ros_endpoint_t *endpoint, const ros_place_t *place, const char *machine, const char *name,
+                       const ros_quality_t *quality, uint32_t number, fcsl_error_t *error);
+
+/* The token of the node itself. Returns 1, 0 where the middleware has none, or -1 with `error`. */
+int ros_node_token_write(ros_token_t token, const ros_place_t *place, fcsl_error_t *error);
 
 #endif /* FCSL_ROS_GRAPH_ENDPOINT_H */

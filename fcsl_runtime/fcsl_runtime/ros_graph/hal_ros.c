@@ -20,7 +20,8 @@ enum {
     ENTRY_BYTES_MAX = 16,  /* of the ring, beside a message */
     RING_BYTES_MIN = 256,
     DEPTH = 10, /* of what is read, best effort, and of commands, reliable */
-    CLOSE_MS = 2000
+    CLOSE_MS = 2000,
+    ROUTER_MS = 5000 /* may pass until rmw_zenoh's router is there */
 };
 
 /* What stands under `hal.`. */
@@ -76,8 +77,7 @@ typedef struct {
 typedef struct {
     fcsl_log_t log;
     fcsl_run_t *run;
-    const char *endpoint;
-    const char *name_space;
+    ros_place_t place;
     fcsl_bus_t *bus;
     sensor_t *sensors; /* the bus's inputs */
     uint32_t sensor_count;
@@ -205,13 +205,8 @@ static void ros_close(void *ctx)
     free(hal);
 }
 
-/* Keys and tokens of all topics, those of sensors before those of outputs. */
-typedef struct {
-    char key[FCSL_BUS_KEY_MAX + 1];
-    char token[FCSL_BUS_TOKEN_MAX + 1];
-} names_t;
-
-static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
+/* The endpoints of all topics, those of sensors before those of outputs. */
+static int name_topics(const hal_t *hal, ros_endpoint_t *endpoints, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
     uint32_t places[] = {hal->sensor_count, 0};
@@ -223,39 +218,46 @@ static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
                                        .hash = message->type_hash,
                                        .reliable = !is_sensor,
                                        .depth = DEPTH};
-        names_t *at = &names[places[is_sensor]++];
-        if (ros_key_write(at->key, hal->name_space, NULL, message->topic, error) != 0 ||
-            ros_token_write(at->token, at->key, &quality, error) != 0) {
+        const uint32_t number = places[is_sensor]++;
+        if (ros_endpoint_write(&endpoints[number], &hal->place, NULL, message->topic, &quality, number, error) != 0) {
             return -1;
         }
     }
     return 0;
 }
 
-static int open_session(hal_t *hal, const names_t *names, const char **texts, fcsl_bus_input_t *inputs,
+static int open_session(hal_t *hal, const ros_endpoint_t *endpoints, const char **texts, fcsl_bus_input_t *inputs,
                         fcsl_error_t *error)
 {
     const uint32_t count = hal->sensor_count + hal->output_count;
+    ros_token_t node;
+    const int node_count = ros_node_token_write(node, &hal->place, error);
+    if (node_count < 0) {
+        return -1;
+    }
     uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
     for (uint32_t i = 0; i < count; i++) {
-        texts[i] = names[i].key;
-        texts[count + i] = names[i].token;
+        texts[i] = endpoints[i].key;
+        texts[count + i] = endpoints[i].token;
     }
+    texts[2u * count] = node;
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
-        inputs[i] = (fcsl_bus_input_t){.key = names[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
+        inputs[i] = (fcsl_bus_input_t){.key = endpoints[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
     }
     for (uint32_t i = 0; i < hal->output_count; i++) {
         tick_bytes += hal->outputs[i].size + ENTRY_BYTES_MAX;
     }
-    const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
-                                        .endpoint = hal->endpoint,
+    const fcsl_bus_options_t options = {.role = hal->place.role,
+                                        .endpoint = hal->place.address,
+                                        .timeout_ms = ROUTER_MS,
+                                        .attaches = hal->place.middleware == ROS_BY_RMW_ZENOH,
                                         .ring_bytes = TICKS_POSTED * tick_bytes,
                                         .outputs = texts + hal->sensor_count,
                                         .output_count = hal->output_count,
                                         .inputs = inputs,
                                         .input_count = hal->sensor_count,
                                         .tokens = texts + count,
-                                        .token_count = count};
+                                        .token_count = count + (uint32_t)node_count};
     return fcsl_bus_open(&options, &hal->bus, error);
 }
 
@@ -264,20 +266,20 @@ static int ros_open(fcsl_hal_t *handle, fcsl_error_t *error)
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
     const size_t count = (size_t)hal->sensor_count + hal->output_count;
-    names_t *names = calloc(count, sizeof *names);
-    const char **texts = calloc(2u * count, sizeof *texts);
+    ros_endpoint_t *endpoints = calloc(count, sizeof *endpoints);
+    const char **texts = calloc(2u * count + 1u, sizeof *texts);
     fcsl_bus_input_t *inputs = calloc(count, sizeof *inputs);
     int failed = -1;
-    if (names == NULL || texts == NULL || inputs == NULL) {
+    if (endpoints == NULL || texts == NULL || inputs == NULL) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
-    } else if (name_topics(hal, names, &reason) != 0) {
+    } else if (name_topics(hal, endpoints, &reason) != 0) {
         (void)fcsl_fail(error, "%s", reason.text);
     } else {
-        failed = open_session(hal, names, texts, inputs, error);
+        failed = open_session(hal, endpoints, texts, inputs, error);
     }
     free(inputs);
     free((void *)texts);
-    free(names);
+    free(endpoints);
     return failed ? -1 : 0;
 }
 
@@ -335,9 +337,7 @@ int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_
         return fcsl_fail(error, "out of memory for the ROS 2 graph");
     }
     self->run = run;
-    self->endpoint = endpoint;
-    self->name_space = name_space;
-    if (add_topics(self, error) != 0) {
+    if (ros_place_read(&self->place, endpoint, name_space, machine->name, error) != 0 || add_topics(self, error) != 0) {
         ros_close(self);
         return -1;
     }

@@ -18,7 +18,8 @@ enum {
     TICKS_POSTED = 64, /* at most, before all of them must have left */
     TICKS_SPARE = 2,   /* one that is leaving, and what is lost where the ring ends */
     ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
-    CLOSE_MS = 2000
+    CLOSE_MS = 2000,
+    ROUTER_MS = 5000 /* may pass until rmw_zenoh's router is there */
 };
 /* Fewer ticks are posted at a time where these would take more. */
 static const uint64_t RING_BYTES = UINT64_C(4) << 20;
@@ -140,30 +141,39 @@ static uint32_t size_ring(fcsl_ros_graph_t *g, size_t *longest)
     return bytes < UINT32_MAX ? (uint32_t)bytes : UINT32_MAX; /* the bus refuses so many */
 }
 
-static int listen_on(fcsl_ros_graph_t *g, const char *endpoint, fcsl_error_t *error)
+static int open_session(fcsl_ros_graph_t *g, fcsl_error_t *error)
 {
     fcsl_error_t reason;
     size_t longest = 0;
     const uint32_t count = g->topics.count;
     const uint32_t ring_bytes = size_ring(g, &longest);
-    const char **keys = calloc(2u * count, sizeof *keys);
+    const ros_place_t *place = &g->topics.place;
+    ros_token_t node;
+    const int node_count = ros_node_token_write(node, place, error);
+    if (node_count < 0) {
+        return -1;
+    }
+    const char **keys = calloc(2u * count + 1u, sizeof *keys);
     g->message = malloc(longest);
     if (keys == NULL || g->message == NULL) {
         free((void *)keys);
         return fcsl_fail(error, "out of memory for the ROS 2 graph");
     }
     for (uint32_t i = 0; i < count; i++) {
-        keys[i] = g->topics.topics[i].key;
-        keys[count + i] = g->topics.topics[i].token;
+        keys[i] = g->topics.topics[i].endpoint.key;
+        keys[count + i] = g->topics.topics[i].endpoint.token;
     }
-    const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
-                                        .endpoint = endpoint,
+    keys[2u * count] = node;
+    const fcsl_bus_options_t options = {.role = place->role,
+                                        .endpoint = place->address,
+                                        .timeout_ms = ROUTER_MS,
+                                        .attaches = place->middleware == ROS_BY_RMW_ZENOH,
                                         .ring_bytes = ring_bytes,
                                         .outputs = keys,
                                         .output_count = count,
                                         .latched_count = g->topics.latched_count,
                                         .tokens = keys + count,
-                                        .token_count = count};
+                                        .token_count = count + (uint32_t)node_count};
     const int failed = fcsl_bus_open(&options, &g->bus, &reason);
     free((void *)keys);
     return failed ? fcsl_fail(error, "no ROS 2 graph: %s", reason.text) : 0;
@@ -182,7 +192,7 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
     g->simulated = options->simulated;
     if (history_reader_open(&g->reader, history, fcsl_run_machine(options->run)->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
-    } else if (ros_topics_build(&g->topics, options, error) == 0 && listen_on(g, options->endpoint, error) == 0) {
+    } else if (ros_topics_build(&g->topics, options, error) == 0 && open_session(g, error) == 0) {
         return g;
     }
     fcsl_ros_graph_close(g);

@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "endpoint.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_tick_time.h"
@@ -45,8 +44,17 @@ static const fixed_t FIXED[] = {
 };
 enum { FIXED_COUNT = sizeof FIXED / sizeof FIXED[0] };
 
-/* Key and token of a topic of which the complete text of the type is known. */
-static int announce(ros_topic_t *topic, const char *type, const char *schema, unsigned depth, fcsl_error_t *error)
+/* The topic's endpoint. */
+static int name_endpoint(ros_topics_t *topics, ros_topic_t *topic, const char *machine, const char *name,
+                         const ros_quality_t *quality, fcsl_error_t *error)
+{
+    return ros_endpoint_write(&topic->endpoint, &topics->place, machine, name, quality,
+                              (uint32_t)(topic - topics->topics), error);
+}
+
+/* The same where the complete text of the type is known. */
+static int announce(ros_topics_t *topics, ros_topic_t *topic, const char *machine, const char *name, const char *type,
+                    const char *schema, unsigned depth, fcsl_error_t *error)
 {
     char hash[FCSL_TYPE_HASH_BYTES];
     if (fcsl_type_hash(type, schema, hash) != 0) {
@@ -54,7 +62,7 @@ static int announce(ros_topic_t *topic, const char *type, const char *schema, un
     }
     const ros_quality_t quality = {
         .kind = ROS_PUBLISHER, .type = type, .hash = hash, .reliable = 1, .latched = topic->latched, .depth = depth};
-    return ros_token_write(topic->token, topic->key, &quality, error);
+    return name_endpoint(topics, topic, machine, name, &quality, error);
 }
 
 /* ---- the topics of a machine ---------------------------------------------------------------------------------------- */
@@ -81,7 +89,7 @@ static uint32_t tick_message_bytes(const fcsl_machine_t *machine)
     return bytes < FCSL_MESSAGE_BYTES_MAX ? (uint32_t)bytes : FCSL_MESSAGE_BYTES_MAX;
 }
 
-static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *name_space, fcsl_error_t *error)
+static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, fcsl_error_t *error)
 {
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_TICK_MESSAGE;
@@ -93,19 +101,17 @@ static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *nam
     if (topic->last_message == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
-    return ros_key_write(topic->key, name_space, topics->machine->name, fixed->name, error) != 0
-               ? -1
-               : announce(topic, fixed->type, fixed->schema, fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
+    return announce(topics, topic, topics->machine->name, fixed->name, fixed->type, fixed->schema,
+                    fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
 }
 
-static int add_events(ros_topics_t *topics, const char *name_space, fcsl_error_t *error)
+static int add_events(ros_topics_t *topics, fcsl_error_t *error)
 {
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_EVENTS;
     topic->longest = (uint32_t)fcsl_event_message_capacity(topics->machine);
-    return ros_key_write(topic->key, name_space, topics->machine->name, "events", error) != 0
-               ? -1
-               : announce(topic, "fcsl_msgs/msg/Event", FCSL_SCHEMA_EVENT, DEPTH_EVENT, error);
+    return announce(topics, topic, topics->machine->name, "events", "fcsl_msgs/msg/Event", FCSL_SCHEMA_EVENT,
+                    DEPTH_EVENT, error);
 }
 
 /* Of all topics only this one is outside of the namespace. */
@@ -114,13 +120,10 @@ static int add_clock(ros_topics_t *topics, fcsl_error_t *error)
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_CLOCK;
     topic->longest = CLOCK_BYTES;
-    return ros_key_write(topic->key, "", NULL, "/clock", error) != 0
-               ? -1
-               : announce(topic, "rosgraph_msgs/msg/Clock", FCSL_SCHEMA_CLOCK, DEPTH_STREAM, error);
+    return announce(topics, topic, NULL, "/clock", "rosgraph_msgs/msg/Clock", FCSL_SCHEMA_CLOCK, DEPTH_STREAM, error);
 }
 
-static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, const char *name_space,
-                        fcsl_error_t *error)
+static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, fcsl_error_t *error)
 {
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_INSTANCE;
@@ -129,8 +132,8 @@ static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, c
     int failed = schema == NULL || name == NULL ? fcsl_fail(error, "out of memory for topics") : 0;
     if (failed == 0) {
         failed = fcsl_layout_build(topics->machine, instance, &topic->layout, error) != 0 ||
-                 ros_key_write(topic->key, name_space, topics->machine->name, name, error) != 0 ||
-                 announce(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
+                 announce(topics, topic, topics->machine->name, name, instance->message_type, schema, DEPTH_STREAM,
+                          error) != 0;
     }
     free(name);
     free(schema);
@@ -138,8 +141,7 @@ static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, c
     return failed ? -1 : 0;
 }
 
-static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, const char *name_space,
-                      fcsl_error_t *error)
+static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, fcsl_error_t *error)
 {
     fcsl_error_t reason;
     ros_topic_t *topic = &topics->topics[topics->count++];
@@ -155,40 +157,37 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
     if (topic->composer == NULL) {
         return fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
     }
-    return ros_key_write(topic->key, name_space, NULL, message->topic, error) != 0
-               ? -1
-               : ros_token_write(topic->token, topic->key, &quality, error);
+    return name_endpoint(topics, topic, NULL, message->topic, &quality, error);
 }
 
 int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(options->run);
-    const char *name_space = options->name_space;
     *topics = (ros_topics_t){.run = options->run, .machine = machine, .safe = fcsl_run_safe_data(options->run)};
     topics->topics =
         calloc((size_t)machine->instance_count + machine->ros_message_count + FIXED_COUNT + 2u, sizeof *topics->topics);
     if (topics->topics == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
-    int failed = 0;
+    int failed = ros_place_read(&topics->place, options->endpoint, options->name_space, machine->name, error);
     for (uint32_t i = 0; i < FIXED_COUNT && !failed; i++) {
-        failed = add_fixed(topics, &FIXED[i], name_space, error);
+        failed = add_fixed(topics, &FIXED[i], error);
     }
     if (machine->event_site_count > 0u && !failed) {
-        failed = add_events(topics, name_space, error);
+        failed = add_events(topics, error);
     }
     if (options->simulated && !failed) {
         failed = add_clock(topics, error);
     }
     for (uint32_t i = 0; i < machine->instance_count && !failed; i++) {
         if (machine->instances[i].published) {
-            failed = add_instance(topics, &machine->instances[i], name_space, error);
+            failed = add_instance(topics, &machine->instances[i], error);
         }
     }
     for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
         const fcsl_ros_message_t *message = &machine->ros_messages[i];
         if (message->direction == FCSL_SENSOR ? options->sensors : options->actuators) {
-            failed = add_mapped(topics, message, name_space, error);
+            failed = add_mapped(topics, message, error);
         }
     }
     for (uint32_t i = 0; i < topics->count; i++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The topics of a machine as zenoh-plugin-ros2dds sees them: key, liveliness token, messages of a tick.
+ * The topics of a machine in a ROS 2 graph: endpoint, messages of a tick.
  */
 #ifndef FCSL_ROS_GRAPH_ROS_TOPICS_H
 #define FCSL_ROS_GRAPH_ROS_TOPICS_H
@@ -10,6 +10,7 @@
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_ros_graph.h"
+#include "endpoint.h"
 #include "messages/message.h"
 #include "messages/tick_messages.h"
 #include "observers/history_reader.h"
@@ -28,13 +29,13 @@ typedef struct {
     uint32_t longest;         /* bytes of the longest message */
     uint32_t last_message_bytes;      /* of the last one */
     uint8_t *last_message;
-    char key[FCSL_BUS_KEY_MAX + 1];
-    char token[FCSL_BUS_TOKEN_MAX + 1];
+    ros_endpoint_t endpoint;
 } ros_topic_t;
 
 typedef struct {
     const fcsl_run_t *run;
     const fcsl_machine_t *machine; /* of it */
+    ros_place_t place; /* in the graph */
     const uint8_t *safe; /* its struct with safe values, or null */
     ros_topic_t *topics; /* the latched ones first */
     uint32_t count;

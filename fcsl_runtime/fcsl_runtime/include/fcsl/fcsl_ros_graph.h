@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A host's machine in a ROS 2 graph, without a ROS 2 library: CDR messages on the keys of zenoh-plugin-ros2dds, over a session
- * of the bus of its own (docs/reference/transports.md). Flight program and simulator serve it through this file.
+ * A host's machine in a ROS 2 graph, without a ROS 2 library: CDR messages on the keys of zenoh-plugin-ros2dds or of
+ * rmw_zenoh, over a session of the bus of its own (docs/reference/transports.md). Flight program and simulator serve it through this file.
  *
  * A thread reads the host's history and never meets the step thread; all memory is taken by open. Ticks that are overwritten
  * before there is room for them on the bus are dropped whole and counted. Messages of streams are made while somebody subscribes
@@ -19,7 +19,7 @@ extern "C" {
 typedef struct fcsl_ros_graph fcsl_ros_graph_t;
 
 typedef struct {
-    const char *endpoint;          /* tcp:HOST:PORT, to listen on; the bridge connects there */
+    const char *endpoint; /* tcp:HOST:PORT, to listen on: a bridge of DDS connects there; or rmw_zenoh:tcp/HOST:PORT, a router */
     const char *name_space;        /* of the topics, "" for none */
     const fcsl_run_t *run; /* its machine's struct is part 0 of the history */
     int sensors;      /* with the topics of mapped sensor channels */
@@ -27,7 +27,7 @@ typedef struct {
     int simulated; /* time is the machine's own, and `clock` tells it; else stamps are ROS time, of the system's clock */
 } fcsl_ros_graph_options_t;
 
-/* Listens and declares all topics; nothing is put before fcsl_ros_graph_start. History and run must outlive it. Null with
+/* Listens, or connects within some seconds, and declares all topics; nothing is put before fcsl_ros_graph_start. History and run must outlive it. Null with
  * `error`. */
 fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, const fcsl_history_t *history,
                                       fcsl_error_t *error);
