@@ -19,11 +19,12 @@ extern "C" {
 typedef struct fcsl_ros_graph fcsl_ros_graph_t;
 
 typedef struct {
-    const char *endpoint; /* tcp:HOST:PORT, to listen on: a bridge of DDS connects there; or rmw_zenoh:tcp/HOST:PORT, a router */
-    const char *name_space;        /* of the topics, "" for none */
+    const char *
+        endpoint; /* tcp:HOST:PORT, to listen on: a bridge of DDS connects there; or rmw_zenoh:tcp/HOST:PORT, a router */
+    const char *name_space; /* of the topics, "" for none */
     const fcsl_run_t *run; /* its machine's struct is part 0 of the history */
-    int sensors;      /* with the topics of mapped sensor channels */
-    int actuators;    /* with those of actuators and reports */
+    int sensors; /* with the topics of mapped sensor channels */
+    int actuators; /* with those of actuators and reports */
     int simulated; /* time is the machine's own, and `clock` tells it; else stamps are ROS time, of the system's clock */
 } fcsl_ros_graph_options_t;
 
