@@ -103,7 +103,7 @@ static _Noreturn void control(const char *spec)
     data_t data = {0};
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     const fcsl_sink_t to = {.ctx = &data, .sensed = sensed};
-    check(fcsl_hal_wire(spec, &MACHINE, WAIT_MS, &hal, &error) == 0, "no HAL");
+    check(fcsl_hal_wire(spec, &MACHINE, WAIT_MS, WAIT_MS, &hal, &error) == 0, "no HAL");
     check(hal.open(&hal, &error) == 0, "the HAL does not open");
     for (uint64_t tick = 0;; tick++) {
         fcsl_message_t message;
