@@ -175,8 +175,8 @@ def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
 
 def lockstep() -> dict[str, Any]:
     """Ticks per second of the lander in lock-step, over the bus and over a Unix socket: of two native programs, and of sim_node and
-    controller_node by how many ticks share one publication, and with a subscriber. They take turns; medians. Keys like
-    `unix decimate_1`."""
+    controller_node by how many ticks share one publication, and with a subscriber of all topics, for which the flight waits. They
+    take turns; medians. Keys like `unix decimate_1`."""
     with own_domain() as domain:
         env = environment(domain)
         OUT.mkdir(parents=True, exist_ok=True)
@@ -202,20 +202,19 @@ def _fly_native(place: str) -> float:
 
 
 def _fly_subscribed(env: dict[str, str], place: str) -> float:
-    topics = "topics:=[/clock, /sim/truth, /odom, /lander_control/engine, /lander_control/filter]"
     executable = package_prefix("fcsl_bridge") / "lib/fcsl_bridge/topic_count"
-    line = [str(executable), "--ros-args", "-p", topics]
+    line = [str(executable), "--ros-args", "-p", "machine:=lander_control", "-p", "topics:=[/odom]"]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=env) as listening:
         try:
             assert listening.stderr is not None
             listening.stderr.readline()  # it waits for topics
-            return _fly(1, env, place)
+            return _fly(1, env, place, wait_for_subscribers=1)
         finally:
             listening.kill()
 
 
-def _fly(decimate: int, env: dict[str, str], place: str) -> float:
-    both: dict[str, Any] = {"decimate": decimate} | ({"bus": place} if place else {})
+def _fly(decimate: int, env: dict[str, str], place: str, **given: Any) -> float:
+    both: dict[str, Any] = {"decimate": decimate, **given} | ({"bus": place} if place else {})
     sim = _node("sim_node", sim="package://lander/sim/lander.sim.json", seed=1, **both)
     controller = _node("controller_node", machine="lander/lander_control", **both)
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
