@@ -252,7 +252,7 @@ def test_topics_among_nodes_of_rmw_zenoh(monkeypatch: pytest.MonkeyPatch) -> Non
     wanted = {"transitions", "state", "health", "faults", *INSTANCES}
     assert set(topics) == {"/clock"} | {f"/r1/lander_control/{name}" for name in wanted}
     assert topics["/r1/lander_control/state"][9] == ":1:,1:,:,:,,"  # transient local, depth 1
-    assert topics["/clock"][9] == "::,2000:,:,:,,"
+    assert topics["/clock"][9] == ":2:,2000:,:,:,,"
     for found in endpoints:
         package, name = found[7].split("::msg::dds_::")
         assert found[8] == installed_hash(f"{package}/msg/{name.removesuffix('_')}")

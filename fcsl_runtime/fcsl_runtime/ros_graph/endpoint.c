@@ -138,8 +138,8 @@ static int write_head(ros_token_t token, const ros_place_t *place, uint32_t numb
                     name_space, place->node);
 }
 
-/* The quality of service is left out where it is rmw_zenoh's default: reliable (else 2), volatile (else 1), keep last, no deadline,
- * lifespan or lease. */
+/* The quality of service: reliable (nothing: the default) or best effort (2), transient local (1) or volatile (2; the default differed
+ * between versions), keep last with a depth, and no deadline, lifespan or lease. */
 static int write_for_rmw_zenoh(ros_endpoint_t *endpoint, const ros_place_t *place, const char *name,
                                const ros_quality_t *quality, uint32_t number, fcsl_error_t *error)
 {
@@ -161,7 +161,7 @@ static int write_for_rmw_zenoh(ros_endpoint_t *endpoint, const ros_place_t *plac
     }
     return head + snprintf(endpoint->token + head, sizeof endpoint->token - (size_t)head,
                            "/%%%s/%s/%s/%s:%s:,%u:,:,:,,", topic, type, quality->hash, quality->reliable ? "" : "2",
-                           quality->latched ? "1" : "", quality->depth);
+                           quality->latched ? "1" : "2", quality->depth);
 }
 
 /* --------------------------------------------------------------------------------------------------------------------- */
