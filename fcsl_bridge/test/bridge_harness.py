@@ -89,6 +89,10 @@ class Domain:
         path = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge" / executable
         return self.run([path, "--ros-args", *arguments, *_parameters(parameters)])
 
+    def meeting(self, place: str) -> dict[str, str]:
+        """The parameter of both nodes to meet there: `bus`, where they do by default, or `unix`, a socket."""
+        return {"bus": f"unix:{self.folder}/socket"} if place == "unix" else {}
+
     def run(self, command: Sequence[str | Path]) -> Process:
         self.processes.append(Process(command, self.environment))
         return self.processes[-1]

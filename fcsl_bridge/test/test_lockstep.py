@@ -24,6 +24,8 @@ DURATION = "8.0"
 TICKS = 800
 #: Time limit of those tests that let it expire.
 PATIENCE_S = 4.0
+#: Of a flight that is to be met under way, times real time: over a socket all of it takes a fraction of a second.
+SLOW = 3.0
 
 
 @pytest.fixture
@@ -36,14 +38,9 @@ def load() -> Iterator[None]:
         process.wait()
 
 
-def where(domain: Domain, place: str) -> dict[str, str]:
-    """The nodes' parameter for a place to meet: the bus, by default, or a socket."""
-    return {"bus": f"unix:{domain.folder}/socket"} if place == "unix" else {}
-
-
 def fly(domain: Domain, *remap: str, duration: str, place: str = "bus") -> tuple[Path, int, int]:
     """A whole flight; returns the bag and the exit statuses of simulator and controller."""
-    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **where(domain, place)}
+    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **domain.meeting(place)}
     controller = domain.start("controller_node", *remap, machine=MACHINE, record=bag, **both)
     sim = domain.start("sim_node", *remap, sim=SIM, seed=SEED, duration=duration, **both)
     return bag, sim.finish(), controller.finish()
@@ -86,8 +83,8 @@ def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
 
 @pytest.mark.parametrize("place", ["bus", "unix"])
 def test_killed_controller(domain: Domain, place: str) -> None:
-    controller = domain.start("controller_node", machine=MACHINE, **where(domain, place))
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=PATIENCE_S, **where(domain, place))
+    controller = domain.start("controller_node", machine=MACHINE, **domain.meeting(place))
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=SLOW, timeout_s=PATIENCE_S, **domain.meeting(place))
     controller.wait_for("ASCENT -> COAST")
     controller.signal(signal.SIGKILL)
     controller.finish()
@@ -98,9 +95,9 @@ def test_killed_controller(domain: Domain, place: str) -> None:
 
 @pytest.mark.parametrize("place", ["bus", "unix"])
 def test_killed_simulator(domain: Domain, place: str) -> None:
-    bag, both = domain.folder / "bag", where(domain, place)
+    bag, both = domain.folder / "bag", domain.meeting(place)
     controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=PATIENCE_S, **both)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, **both)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=SLOW, **both)
     controller.wait_for("ASCENT -> COAST")
     sim.signal(signal.SIGKILL)
     sim.finish()
@@ -115,9 +112,9 @@ def test_killed_simulator(domain: Domain, place: str) -> None:
 )
 def test_interrupted_flight(domain: Domain, number: int, place: str) -> None:
     """The simulator shuts down cleanly, sends END to the controller, and its exit status reports unanswered ticks."""
-    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **where(domain, place)}
+    bag, both = domain.folder / "bag", {"timeout_s": 60.0, **domain.meeting(place)}
     controller = domain.start("controller_node", machine=MACHINE, record=bag, **both)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, **both)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=SLOW, **both)
     controller.wait_for("ASCENT -> COAST")
     sim.signal(number)
     assert sim.finish() == 128 + number

@@ -242,8 +242,7 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference, pla
     """On the bus at one address, or each on its own socket beside the other's."""
     counter = domain.start("topic_count", topics="[/clock, /one/sim/truth, /two/sim/truth]")
     bags = {name: domain.folder / name for name in ("one", "two")}
-    meeting = {"bus": f"unix:{domain.folder}/socket"} if place == "unix" else {}
-    parameters = {"machine": MACHINE, "timeout_s": 60.0, "wait_for_subscribers": 0, **meeting}
+    parameters = {"machine": MACHINE, "timeout_s": 60.0, "wait_for_subscribers": 0, **domain.meeting(place)}
     controllers = [
         domain.start("controller_node", "-r", f"__ns:=/{name}", record=bag, **parameters) for name, bag in bags.items()
     ]
@@ -255,7 +254,7 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference, pla
         duration="8.0",
         timeout_s=60.0,
         wait_for_subscribers=1,
-        **meeting,
+        **domain.meeting(place),
     )
     assert sim.finish() == 0 and [c.finish() for c in controllers] == [0, 0], sim.err
     for number, bag in enumerate(bags.values()):

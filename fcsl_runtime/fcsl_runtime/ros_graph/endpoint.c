@@ -11,7 +11,7 @@
 
 #include "fcsl/fcsl_error.h"
 
-enum { DOMAIN_MAX = 232, DOMAIN_DIGITS = 3, WORD_BYTES = 2 * FCSL_BUS_KEY_MAX };
+enum { ROUTER_MS = 5000, DOMAIN_MAX = 232, DOMAIN_DIGITS = 3, WORD_BYTES = 2 * FCSL_BUS_KEY_MAX };
 
 /* ---- a place in a graph --------------------------------------------------------------------------------------------- */
 
@@ -182,13 +182,28 @@ int ros_endpoint_write(ros_endpoint_t *endpoint, const ros_place_t *place, const
     return size < 0 ? -1 : 0;
 }
 
-int ros_node_token_write(ros_token_t token, const ros_place_t *place, fcsl_error_t *error)
+int ros_session_open(const ros_place_t *place, const fcsl_bus_options_t *options, const char **tokens,
+                     uint32_t token_count, fcsl_bus_t **bus, fcsl_error_t *error)
 {
+    fcsl_error_t reason;
+    ros_token_t node;
+    fcsl_bus_options_t placed = *options;
+    placed.role = place->role;
+    placed.endpoint = place->address;
+    placed.tokens = tokens;
+    placed.token_count = token_count;
     if (place->middleware == ROS_BY_BRIDGE) {
-        return 0;
+        return fcsl_bus_open(&placed, bus, error);
     }
-    const int size = write_head(token, place, 0, "NN");
-    return size > 0 && size <= (int)FCSL_BUS_TOKEN_MAX
-               ? 1
-               : fcsl_fail(error, "node %.200s has too long a name", place->node);
+    const int size = write_head(node, place, 0, "NN");
+    if (size < 0 || size > (int)FCSL_BUS_TOKEN_MAX) {
+        return fcsl_fail(error, "node %.200s has too long a name", place->node);
+    }
+    tokens[token_count] = node;
+    placed.token_count = token_count + 1u;
+    placed.timeout_ms = ROUTER_MS;
+    placed.attaches = 1;
+    return fcsl_bus_open(&placed, bus, &reason) == 0
+               ? 0
+               : fcsl_fail(error, "%s; `ros2 run rmw_zenoh_cpp rmw_zenohd` starts the router", reason.text);
 }

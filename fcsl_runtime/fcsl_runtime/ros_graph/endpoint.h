@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A publisher or subscription in a ROS 2 graph: its key on Zenoh, and the liveliness token that announces it, as the
- * middleware of the graph reads them.
+ * middleware of the graph reads them; and the session that holds them.
  */
 #ifndef FCSL_ROS_GRAPH_ENDPOINT_H
 #define FCSL_ROS_GRAPH_ENDPOINT_H
@@ -23,7 +23,6 @@ typedef struct {
     unsigned domain;
 } ros_place_t;
 
-/* Most bytes of a session's tokens, one for each endpoint, and one more. */
 typedef char ros_token_t[FCSL_BUS_TOKEN_MAX + 1];
 
 typedef enum { ROS_PUBLISHER, ROS_SUBSCRIPTION } ros_endpoint_kind_t;
@@ -52,7 +51,9 @@ int ros_place_read(ros_place_t *place, const char *address, const char *name_spa
 int ros_endpoint_write(ros_endpoint_t *endpoint, const ros_place_t *place, const char *machine, const char *name,
                        const ros_quality_t *quality, uint32_t number, fcsl_error_t *error);
 
-/* The token of the node itself. Returns 1, 0 where the middleware has none, or -1 with `error`. */
-int ros_node_token_write(ros_token_t token, const ros_place_t *place, fcsl_error_t *error);
+/* Opens the graph's session with these tokens of endpoints; the array has room for one more, that of the node. What `options` says of
+ * place and tokens is not looked at. Waits some seconds for a router. Returns 0, or -1 with `error`. */
+int ros_session_open(const ros_place_t *place, const fcsl_bus_options_t *options, const char **tokens,
+                     uint32_t token_count, fcsl_bus_t **bus, fcsl_error_t *error);
 
 #endif /* FCSL_ROS_GRAPH_ENDPOINT_H */

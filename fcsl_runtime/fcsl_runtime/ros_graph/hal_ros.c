@@ -20,8 +20,7 @@ enum {
     ENTRY_BYTES_MAX = 16,  /* of the ring, beside a message */
     RING_BYTES_MIN = 256,
     DEPTH = 10, /* of what is read, best effort, and of commands, reliable */
-    CLOSE_MS = 2000,
-    ROUTER_MS = 5000 /* may pass until rmw_zenoh's router is there */
+    CLOSE_MS = 2000
 };
 
 /* What stands under `hal.`. */
@@ -230,35 +229,23 @@ static int open_session(hal_t *hal, const ros_endpoint_t *endpoints, const char 
                         fcsl_error_t *error)
 {
     const uint32_t count = hal->sensor_count + hal->output_count;
-    ros_token_t node;
-    const int node_count = ros_node_token_write(node, &hal->place, error);
-    if (node_count < 0) {
-        return -1;
-    }
     uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
     for (uint32_t i = 0; i < count; i++) {
         texts[i] = endpoints[i].key;
         texts[count + i] = endpoints[i].token;
     }
-    texts[2u * count] = node;
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
         inputs[i] = (fcsl_bus_input_t){.key = endpoints[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
     }
     for (uint32_t i = 0; i < hal->output_count; i++) {
         tick_bytes += hal->outputs[i].size + ENTRY_BYTES_MAX;
     }
-    const fcsl_bus_options_t options = {.role = hal->place.role,
-                                        .endpoint = hal->place.address,
-                                        .timeout_ms = ROUTER_MS,
-                                        .attaches = hal->place.middleware == ROS_BY_RMW_ZENOH,
-                                        .ring_bytes = TICKS_POSTED * tick_bytes,
+    const fcsl_bus_options_t options = {.ring_bytes = TICKS_POSTED * tick_bytes,
                                         .outputs = texts + hal->sensor_count,
                                         .output_count = hal->output_count,
                                         .inputs = inputs,
-                                        .input_count = hal->sensor_count,
-                                        .tokens = texts + count,
-                                        .token_count = count + (uint32_t)node_count};
-    return fcsl_bus_open(&options, &hal->bus, error);
+                                        .input_count = hal->sensor_count};
+    return ros_session_open(&hal->place, &options, texts + count, count, &hal->bus, error);
 }
 
 static int ros_open(fcsl_hal_t *handle, fcsl_error_t *error)

@@ -18,8 +18,7 @@ enum {
     TICKS_POSTED = 64, /* at most, before all of them must have left */
     TICKS_SPARE = 2,   /* one that is leaving, and what is lost where the ring ends */
     ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
-    CLOSE_MS = 2000,
-    ROUTER_MS = 5000 /* may pass until rmw_zenoh's router is there */
+    CLOSE_MS = 2000
 };
 /* Fewer ticks are posted at a time where these would take more. */
 static const uint64_t RING_BYTES = UINT64_C(4) << 20;
@@ -147,12 +146,6 @@ static int open_session(fcsl_ros_graph_t *g, fcsl_error_t *error)
     size_t longest = 0;
     const uint32_t count = g->topics.count;
     const uint32_t ring_bytes = size_ring(g, &longest);
-    const ros_place_t *place = &g->topics.place;
-    ros_token_t node;
-    const int node_count = ros_node_token_write(node, place, error);
-    if (node_count < 0) {
-        return -1;
-    }
     const char **keys = calloc(2u * count + 1u, sizeof *keys);
     g->message = malloc(longest);
     if (keys == NULL || g->message == NULL) {
@@ -163,18 +156,9 @@ static int open_session(fcsl_ros_graph_t *g, fcsl_error_t *error)
         keys[i] = g->topics.topics[i].endpoint.key;
         keys[count + i] = g->topics.topics[i].endpoint.token;
     }
-    keys[2u * count] = node;
-    const fcsl_bus_options_t options = {.role = place->role,
-                                        .endpoint = place->address,
-                                        .timeout_ms = ROUTER_MS,
-                                        .attaches = place->middleware == ROS_BY_RMW_ZENOH,
-                                        .ring_bytes = ring_bytes,
-                                        .outputs = keys,
-                                        .output_count = count,
-                                        .latched_count = g->topics.latched_count,
-                                        .tokens = keys + count,
-                                        .token_count = count + (uint32_t)node_count};
-    const int failed = fcsl_bus_open(&options, &g->bus, &reason);
+    const fcsl_bus_options_t options = {
+        .ring_bytes = ring_bytes, .outputs = keys, .output_count = count, .latched_count = g->topics.latched_count};
+    const int failed = ros_session_open(&g->topics.place, &options, keys + count, count, &g->bus, &reason);
     free((void *)keys);
     return failed ? fcsl_fail(error, "no ROS 2 graph: %s", reason.text) : 0;
 }
