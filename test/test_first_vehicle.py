@@ -50,6 +50,8 @@ def run(commands: str, folder: Path, status: int) -> str:
         )
         try:
             shell.wait(timeout=300)
+        except subprocess.TimeoutExpired:
+            pass  # its status is none; what it printed says where it stood
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(shell.pid, signal.SIGKILL)  # what a failure leaves behind
