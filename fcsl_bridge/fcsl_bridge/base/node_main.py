@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -29,6 +30,7 @@ from fcsl_compiler.api.diagnostics import DiagnosticError
 from fcsl_compiler.api.packages import PackageNotFound
 from fcsl_sim.errors import SimError
 from simclient.errors import MapError, TwinError, ViewError
+from simclient.exit_within import exit_within
 
 from ..errors import BridgeError, Stopped
 from ..loopback import loopback_environment
@@ -37,6 +39,8 @@ from .node_logger import NodeLogger
 _MATCH_POLL_S = 0.02
 #: How long the end of a node waits for those who listen to /rosout.
 _LAST_WORDS_S = 2.0
+#: How long ROS may take to remove a node, in s.
+_DESTROY_S = 5.0
 #: Parameters that rclpy itself declares.
 _DESCRIBES_TYPES = "start_type_description_service"
 _ROS_PARAMETERS = ("use_sim_time", _DESCRIBES_TYPES, "qos_overrides")
@@ -93,6 +97,7 @@ def run_node(
     """
     stop = Stop()
     node = logger = None
+    status = 1
     try:
         if any(word in ("-h", "--help") for word in sys.argv[1:]):
             print(_help(name, options), flush=True)
@@ -117,9 +122,9 @@ def run_node(
             enable_rosout=False,
         )
         logger = NodeLogger(node)
-        status = body(node, stop)
+        ended = body(node, stop)
         sys.stdout.flush()
-        return status
+        status = ended
     except DiagnosticError as error:
         print(error, file=sys.stderr)
         _report(node, name, "the simulation has errors")
@@ -138,9 +143,14 @@ def run_node(
         if logger is not None:
             wait_for_receivers([logger.publisher], _LAST_WORDS_S)
         if node is not None:
+            # Fast DDS 2.14 may wait for itself where another node ends at the same time: its callback of a writer that is
+            # gone holds what DomainParticipant::set_listener waits for.
+            with suppress(OSError):
+                sys.stdout.flush()
+            exit_within(_DESTROY_S, status)
             node.destroy_node()
         rclpy.try_shutdown()
-    return 1
+    return status
 
 
 def _read_arguments(name: str, called: Callable[[Node], str]) -> tuple[str, dict[str, Parameter]]:
