@@ -193,6 +193,8 @@ class Descriptor(c.Structure):
         ("channel_count", c.c_uint32),
         ("ros_messages", c.c_void_p),
         ("ros_message_count", c.c_uint32),
+        ("services", c.c_void_p),
+        ("service_count", c.c_uint32),
         ("payloads", c.c_void_p),
         ("arm_field", c.c_int32),
         ("command_timeout_ns", c.c_uint64),

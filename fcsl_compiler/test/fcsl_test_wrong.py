@@ -858,6 +858,18 @@ def channel(*channels: Mapping[str, Any]) -> str:
     return put("channels", value=[{**base, **c} for c in channels])
 
 
+def service(*keys: Mapping[str, Any], field: str = "two.inputs.on", **channel_keys: Any) -> str:
+    """Channels of services of these keys: one that is fine where they say nothing."""
+    base = {"type": "std_srvs/Trigger", "service": "go", "accepted": "machine.state == 'B'"}
+    fields = (field, "one.inputs.on")
+    return channel(
+        *(
+            {"name": f"go{i}", "id": i + 1, "field": fields[i], "ros": {**base, **k}, **channel_keys}
+            for i, k in enumerate(keys)
+        )
+    )
+
+
 def panel(*paths: str, **keys: Any) -> str:
     """One panel with these curves."""
     return put("views", value={"panels": [{"title": "t", "values": list(paths), **keys}]})
@@ -1094,6 +1106,7 @@ CONFIGS: dict[str, str] = {
     "E224 equal priorities": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD, "priority": 3}] * 2),
     "E236 a misspelt message": mapped({"type": "sensor_msgs/IMU"}),
     "E236 a package of somebody's": mapped({"type": "acme_msgs/Thing"}),
+    "E236 a service": mapped({"type": "std_srvs/Trigger", "field": "data"}),
     "E237 a misspelt field": mapped({"field": "angular_velocty"}),
     "E237 no such field": mapped({"field": "gyro"}),
     "E237 below a number": mapped({"field": "angular_velocity.x.y"}),
@@ -1135,6 +1148,21 @@ CONFIGS: dict[str, str] = {
     ),
     "E258 a choice of nothing": mapped({"choices": []}),
     "E258 a choice of lists": mapped({"choices": [[1]]}),
+    "E259 a condition of no field": service({"accepted": "one.outputs.z > 1.0"}),
+    "E259 a condition of units that differ": service({"accepted": "one.outputs.y > one.inputs.x"}),
+    "E259 a number as a condition": service({"accepted": "one.outputs.y"}),
+    "E259 a state that is none": service({"refused": "machine.state == 'C'"}),
+    "E259 a condition without fields": service({"accepted": "1 < 2"}),
+    "E259 calls of a number": channel(
+        {"ros": {"type": "std_srvs/Trigger", "service": "go", "accepted": "machine.state == 'B'"}}
+    ),
+    "E259 calls that go out": service({}, direction="actuator", field="one.outputs.y"),
+    "E259 an age": service({}, max_age_ticks=5),
+    "E259 two of one name": service({}, {}),
+    "E201 a topic of a service": service({"topic": "go"}),
+    "E203 a name of a service": service({"service": "~/go"}),
+    "E205 another type of service": service({"type": "std_srvs/Empty"}),
+    "E244 half a tick": service({"within_s": 0.015}),
     "E241 two types": mapped({}, {"type": "sensor_msgs/MagneticField", "field": "magnetic_field"}),
     "E241 two frames": mapped({"frame": "imu"}, {}),
     "E241 a field twice": mapped({}, {}),

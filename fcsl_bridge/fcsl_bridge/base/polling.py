@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Polled subscriptions, and a node's other callbacks in the slack between ticks.
+"""Polled subscriptions and services, and a node's other callbacks in the slack between ticks.
 
 rclpy's executors build a wait set of every entity of the node for each wait (0.5 ms with 20 topics). A loop that
 waits for one topic a thousand times a second waits for that topic only, and serves the other entities occasionally.
@@ -34,7 +34,7 @@ class _NeverExecuted(CallbackGroup):
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        raise AssertionError("no executor runs a polled subscription")
+        raise AssertionError("no executor runs what is polled")
 
 
 class PolledSubscription:
@@ -83,8 +83,32 @@ class PolledSubscription:
         self._node.destroy_subscription(self._subscription)
 
 
-def _unused(data: bytes) -> None:
-    raise AssertionError("a polled subscription has no callback")
+class PolledService:
+    """Requests of one service, taken by the owner, who answers them when it can. Not thread-safe."""
+
+    def __init__(self, node: Node, kind: Any, name: str):
+        self._node, self._kind = node, kind
+        self._group = _NeverExecuted()  # the node keeps only a weak reference
+        self._service = node.create_service(kind, name, _unused, callback_group=self._group)
+
+    def take(self) -> tuple[Any, Any] | None:
+        """The oldest request that waits, and what its answer needs; None if there is none."""
+        request, header = self._service.handle.service_take_request(self._kind.Request)
+        return None if header is None else (request, header)
+
+    def answer(self, values: tuple[Any, ...], header: Any) -> None:
+        """Sends a response with these values, in the order of its fields. A caller that is gone does not get it."""
+        response = self._kind.Response()
+        for name, value in zip(response.get_fields_and_field_types(), values, strict=True):
+            setattr(response, name, value)
+        self._service.send_response(response, header)
+
+    def close(self) -> None:
+        self._node.destroy_service(self._service)
+
+
+def _unused(*_: Any) -> None:
+    raise AssertionError("what is polled has no callback")
 
 
 class Housekeeping:

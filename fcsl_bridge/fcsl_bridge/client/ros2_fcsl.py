@@ -113,7 +113,7 @@ class InfoVerb(Verb):
 
 def _channel(channel: Any) -> Sequence[str]:
     """A row of the table."""
-    mapped = f"{channel.topic} ({channel.message}, {channel.field})" if channel.topic else ""
+    mapped = f"{channel.topic} ({', '.join(filter(None, (channel.message, channel.field)))})" if channel.topic else ""
     return f"  {channel.name}", channel.direction, str(channel.id), channel.type, channel.unit, mapped
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from rclpy.node import Node
 
 from ..diagnostics.machine_status import Figures
+from ..topics.mapped_services import Services
 from ..topics.mapped_topics import Inputs
 from .configured_machine import ConfiguredMachine
 from .ros_time import RosTime
@@ -32,12 +33,16 @@ class FreeRunning:
     def __init__(self, node: Node, configured: ConfiguredMachine, serve: Callable[[], None], simulated: bool):
         self._node, self._configured, self._serve = node, configured, serve
         self._inputs = Inputs(node, configured.run)
+        self._services = Services(node, configured.run)
         self._time = RosTime(node, simulated)
         self._stamp_ns = 0
         self._clockless_at_s = 0.0
         configured.sources.append(self)
         configured.run.time_executes()
-        unmapped = [c.name for c in configured.run.machine.channels if c.direction == "sensor" and not c.ros_type]
+        machine = configured.run.machine
+        called = {service.channel for service in machine.services}
+        sensors = [c for c in machine.channels if c.direction == "sensor" and c.index not in called]
+        unmapped = [c.name for c in sensors if not c.ros_type]
         if unmapped:
             node.get_logger().warning(
                 f"nothing fills {', '.join(unmapped)}: outside lock-step a sensor channel needs `ros`"
@@ -52,6 +57,7 @@ class FreeRunning:
         self._configured.show_changes(self._stamp_ns)
         self._clockless_at_s = time.monotonic() + _NO_CLOCK_S
         self._inputs.forget()
+        self._services.begin(self._stamp_ns)
         gc.unfreeze()
         gc.collect()
         gc.freeze()  # the garbage collector ignores objects that exist now
@@ -65,9 +71,12 @@ class FreeRunning:
         """Makes the tick that was due at stamp_ns, with what came until now_ns; both in ROS time."""
         configured, self._stamp_ns = self._configured, stamp_ns
         configured.run.record_time(stamp_ns)
-        self._inputs.poll(now_ns, configured.dropouts.missing())
+        missing = configured.dropouts.missing()
+        self._inputs.poll(now_ns, missing)
+        self._services.take(now_ns, missing)
         configured.run.step(1)
         configured.show(stamp_ns)
+        self._services.answer(now_ns)
 
     def _diagnose(self) -> None:
         """Once per second, in the slack."""
@@ -86,7 +95,8 @@ class FreeRunning:
             self._node.get_logger().warning(f"no message of /clock has come within {_NO_CLOCK_S:g} s: {self._LACKS}")
 
     def rest(self) -> None:
-        """While inactive there is nothing to do."""
+        """While inactive."""
+        self._services.refuse(self.now_ns())
 
     def now_ns(self) -> int:
         """The time that a message of now is stamped with."""
@@ -107,5 +117,7 @@ class FreeRunning:
 
     def close(self) -> None:
         gc.unfreeze()
+        self._services.refuse(self.now_ns())
+        self._services.close()
         self._inputs.close()
         self._time.close()

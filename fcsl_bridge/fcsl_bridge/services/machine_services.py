@@ -24,6 +24,8 @@ from rclpy.task import Future
 from fcsl_msgs.msg import Channel, Checkpoint
 from fcsl_msgs.srv import Describe, InjectFault, Restore, Save, SetState
 from simclient.checkpoint import read_checkpoint, write_checkpoint
+from simclient.descriptor import Channel as MachineChannel
+from simclient.descriptor import Service
 from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
 
@@ -121,6 +123,7 @@ class MachineServices:
             machine.build_hash,
         )
         response.tick_hz, response.states = machine.tick_hz, list(machine.states)
+        services = {service.channel: service for service in machine.services}
         response.channels = [
             Channel(
                 name=channel.name,
@@ -128,13 +131,20 @@ class MachineServices:
                 direction=channel.direction,
                 type=channel.field.type_text,
                 unit=channel.field.unit,
-                topic=self._node.resolve_topic_name(channel.ros_topic) if channel.ros_type else "",
-                message=channel.ros_type,
-                field=channel.ros_field,
+                **self._mapped(channel, services.get(channel.index)),
             )
             for channel in machine.channels
         ]
         return response
+
+    def _mapped(self, channel: MachineChannel, service: Service | None) -> dict[str, str]:
+        """What carries a channel, in the fields of fcsl_msgs/Channel."""
+        if service is not None:
+            return {"topic": self._node.resolve_service_name(service.name), "message": service.type}
+        if not channel.ros_type:
+            return {}
+        topic = self._node.resolve_topic_name(channel.ros_topic)
+        return {"topic": topic, "message": channel.ros_type, "field": channel.ros_field}
 
     async def _set_state(self, request: Any, response: Any) -> None:
         self._need_forcing()

@@ -14,6 +14,7 @@ from ..parse.json_source import JsonNode
 from .arming import read_safe
 from .ports import PortResolver
 from .ros import check_channels, find_message
+from .services import check_service_channel, check_service_names, read_service
 from .times import read_ticks
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
@@ -63,6 +64,7 @@ def read_channels(
                 reader.sink.error("E226", message, channel.span, help=fix, notes=[(first, "the other")])
         channels.append(channel)
     check_channels(channels, reader.sink)
+    check_service_names(channels, reader.sink)
     return channels
 
 
@@ -105,10 +107,18 @@ def _channel(
     grace = machine_grace if machine_grace is not None else age
     if direction == "sensor" and "start_grace_s" in keys:
         grace = _grace(keys["start_grace_s"], tick_hz, reader)
-    ros = read_ros(keys["ros"], default_topic(name or ""), reader) if "ros" in keys else NOT_MAPPED
+    is_service = "ros" in keys and keys["ros"].get("service") is not None
+    ros: RosMapping | None = NOT_MAPPED
+    service = None
+    if is_service:
+        service = read_service(keys["ros"], tick_hz, reader)
+    elif "ros" in keys:
+        ros = read_ros(keys["ros"], default_topic(name or ""), reader)
     port = _bound(keys.get("field"), direction, ports, connections, reader)
     kind = _kind(keys, port, reader)
     if name is None or number is None or direction is None or port is None or ros is None or kind is None:
+        return None
+    if is_service and (service is None or not check_service_channel(keys, direction, port, reader)):
         return None
     safe = read_safe(keys["safe"], port.type, direction, reader) if "safe" in keys else ()
     safe_span = keys["safe"].span if safe else None
@@ -118,7 +128,7 @@ def _channel(
         reader.sink.error(
             "E250", message, keys["safe"].span, why=why, help="write a 0 first, for example, for no bytes"
         )
-    return Channel(name, number, port, direction, age, grace, ros, item.span, safe or (), safe_span, kind)
+    return Channel(name, number, port, direction, age, grace, ros, item.span, safe or (), safe_span, kind, service)
 
 
 def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader) -> str | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model.literals import round_f32
-from ..model.machine import Channel, RosMapping, Values
+from ..model.machine import SERVICE_TYPES, Channel, RosMapping, Values
 from ..model.types import I32, REQUEST, U32, Array, Scalar, Type, count_of, scalar_of
 from ..parse.json_source import JsonNode
 from ..ros.channels import by_topic, interfaces_of, message_of
@@ -114,7 +114,9 @@ def find_message(type_: str, node: JsonNode, sink: DiagnosticSink) -> Interfaces
 
 
 def _meant(type_: str) -> str:
-    """Help text: the standard message that was probably meant, or ""."""
+    """Help text: what was probably meant, or ""."""
+    if type_ in SERVICE_TYPES:
+        return "it is a service: write its name as `service` instead of a `field`"
     package, _, name = type_.partition("/")
     beside = [n for n in map(short_name, SUPPORTED) if n.startswith(package + "/")]
     names = {n.partition("/")[2].lower(): n for n in beside}

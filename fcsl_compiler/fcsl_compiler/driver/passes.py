@@ -41,6 +41,7 @@ from ..requirements.effects import acting, check_effects, with_effects
 from ..requirements.monitor import Monitor, subset_of
 from ..requirements.read import read_requirements
 from ..requirements.requirement import Requirement
+from ..requirements.services import check_services
 from .c_dependencies import CInputs, extern_inputs
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 
@@ -111,6 +112,7 @@ def _check(c: Compilation) -> None:
         if c.requirements_file is not None:
             c.requirements = read_requirements(c.parsed, c.machine, c.requirements_file, c.sink)
         c.effects = acting(own, c.machine)
+        check_services(c.machine, c.sink)
     if c.strict and c.machine is not None:
         check_strict(c.machine, c.sink)
 

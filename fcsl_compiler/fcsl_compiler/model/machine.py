@@ -206,6 +206,23 @@ class RosMapping:
     spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # spans of the given keys
 
 
+#: Types of services whose calls can be samples of a channel.
+SERVICE_TYPES = ("std_srvs/Trigger", "std_srvs/SetBool")
+
+
+@dataclass(frozen=True)
+class Service:
+    """A ROS 2 service whose calls are samples of a channel, as written in the JSON. After each tick the conditions
+    `accepted` and `refused` ("": nothing refuses) say how the call that waits ends."""
+
+    type: str  # of SERVICE_TYPES
+    name: str
+    accepted: str
+    refused: str
+    within_ticks: int
+    spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # spans of the given keys
+
+
 #: Mapping of a channel without ROS message.
 NOT_MAPPED = RosMapping("", "", "", "", "", "")
 
@@ -223,6 +240,7 @@ class Channel:
     safe: Values = ()  # of an actuator; () if not declared
     safe_span: Span | None = None  # of that value
     kind: str = "field"  # field, quaternion, blob
+    service: Service | None = None  # instead of a message
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below, in fcsl_ros_conversion.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 12u
+#define FCSL_ABI_VERSION 13u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX
@@ -231,6 +231,20 @@ typedef struct {
     const fcsl_ros_reader_plan_t *reader;
 } fcsl_ros_message_t;
 
+/* std_srvs/srv/Trigger, std_srvs/srv/SetBool */
+typedef enum { FCSL_TRIGGER = 0, FCSL_SET_BOOL = 1 } fcsl_service_kind_t;
+
+/* A service of ROS 2 whose calls are samples of a sensor channel, a bool. Conditions over the fields say, after each tick, how the
+ * call that waits ends. */
+typedef struct {
+    const char *name; /* "launch", relative to the namespace of the node */
+    uint8_t kind; /* fcsl_service_kind_t */
+    uint32_t channel; /* index into channels */
+    const char *accepted;
+    const char *refused; /* "": nothing refuses */
+    uint32_t within_ticks; /* after so many without either the call has timed out; 1 or more */
+} fcsl_service_t;
+
 /* A place where a fault can occur, and its cause. */
 typedef struct {
     const char *file; /* path as in the machine JSON; "" for a fault without a source line (an injected one) */
@@ -322,6 +336,8 @@ typedef struct {
     uint32_t channel_count;
     const fcsl_ros_message_t *ros_messages; /* one for each topic of the mapped channels */
     uint32_t ros_message_count;
+    const fcsl_service_t *services;
+    uint32_t service_count;
     /* What lies under the key of each channel on the bus (docs/reference/transports.md): a message of it alone; of a blob a UInt8MultiArray without
      * values. Null: the values as they are. */
     const fcsl_ros_message_t *payloads;

@@ -26,6 +26,9 @@ TYPE_FORMATS = {
 #: fcsl_health_t by number.
 HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
 #: fcsl_severity_t by number.
+#: fcsl_service_kind_t by number.
+SERVICE_TYPES = ("std_srvs/srv/Trigger", "std_srvs/srv/SetBool")
+#: fcsl_severity_t by number.
 SEVERITY_NAMES = ("debug", "info", "warning", "error")
 EVENT_VALUES, EVENTS_PER_TICK = 4, 64
 #: fcsl_role_t by number.
@@ -172,6 +175,19 @@ class CRosMessage(Structure):
     ]
 
 
+class CService(Structure):
+    """fcsl_service_t"""
+
+    _fields_ = [
+        ("name", c_char_p),
+        ("kind", c_uint8),
+        ("channel", c_uint32),
+        ("accepted", c_char_p),
+        ("refused", c_char_p),
+        ("within_ticks", c_uint32),
+    ]
+
+
 class CMachine(Structure):
     _fields_ = [
         ("abi_version", c_uint32),
@@ -202,6 +218,8 @@ class CMachine(Structure):
         ("channel_count", c_uint32),
         ("ros_messages", POINTER(CRosMessage)),
         ("ros_message_count", c_uint32),
+        ("services", POINTER(CService)),
+        ("service_count", c_uint32),
         ("payloads", c_void_p),
         ("arm_field", c_int32),
         ("command_timeout_ns", c_uint64),

@@ -16,6 +16,7 @@ from .c_machine import (
     HEALTH_NAMES,
     IMPURE,
     ROLE_NAMES,
+    SERVICE_TYPES,
     SEVERITY_NAMES,
     TYPE_NAMES,
     WRITABLE,
@@ -148,6 +149,16 @@ class RosMessage:
 
 
 @dataclass(frozen=True)
+class Service:
+    """A ROS 2 service of this `type`, std_srvs/srv/Trigger or SetBool, whose calls are samples of channel number `channel`.
+    `name` is relative to the node's namespace unless it begins with a slash."""
+
+    name: str
+    type: str
+    channel: int
+
+
+@dataclass(frozen=True)
 class Transition:
     """A transition between states.
 
@@ -222,6 +233,7 @@ class Machine:
     views: str = ""
     #: The messages of mapped channels, by topic.
     ros_messages: tuple[RosMessage, ...] = ()
+    services: tuple[Service, ...] = ()
     #: Whether it describes only the part of the machine that a telemetry sender sends.
     partial: bool = False
 
@@ -391,6 +403,11 @@ def _read_ros_messages(machine: Any) -> tuple[RosMessage, ...]:
     )
 
 
+def _read_services(machine: Any) -> tuple[Service, ...]:
+    raw = [machine.services[i] for i in range(machine.service_count)]
+    return tuple(Service(name=_text(s.name), type=SERVICE_TYPES[s.kind], channel=s.channel) for s in raw)
+
+
 def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
     """The descriptor at `pointer`, whose tables must have been validated (fcsl_run_open does that)."""
     machine = pointer.contents
@@ -413,6 +430,7 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         transitions=_read_transitions(machine, states, requests, names),
         channels=_read_channels(machine, fields),
         ros_messages=_read_ros_messages(machine),
+        services=_read_services(machine),
         fault_places=_read_fault_places(machine),
         event_sites=_read_event_sites(machine),
         views=_text(machine.views),

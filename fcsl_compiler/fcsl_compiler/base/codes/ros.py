@@ -79,4 +79,15 @@ ROS_CODES: dict[str, Code] = {
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity", "choices": ["x", "y"]'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
     ),
+    "E259": Code(
+        "a service that cannot be offered",
+        "With `service` the `ros` entry of a sensor channel, a bool, offers a service, std_srvs/Trigger or SetBool. Its "
+        "calls are the samples of the channel, which has no `max_age_ticks`: a value holds until the next call. The "
+        "conditions `accepted` and `refused` are about fields as they stand after a tick, and say how a call ends.",
+        Kind.JSON,
+        '"channels": [{"name": "arm", "id": 1, "field": "control.inputs.armed", "direction": "sensor",\n'
+        '              "ros": {"type": "std_srvs/SetBool", "service": "arm", "accepted": "control.outputs.redy"}}]',
+        '"channels": [{"name": "arm", "id": 1, "field": "control.inputs.armed", "direction": "sensor",\n'
+        '              "ros": {"type": "std_srvs/SetBool", "service": "arm", "accepted": "control.outputs.ready"}}]',
+    ),
 }

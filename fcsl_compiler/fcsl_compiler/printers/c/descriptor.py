@@ -71,6 +71,7 @@ class DescriptorEmitter:
         self._transitions()
         self._channels()
         self._ros_messages()
+        self._services()
         self._fault_places()
         self._event_sites()
         self._machine()
@@ -212,6 +213,19 @@ class DescriptorEmitter:
         rows = [emitter.emit(payload_of(channel), f"{prefix}_payload_{i}") for i, channel in enumerate(cdr)]
         self.payloads = self._table("fcsl_ros_message_t", f"{prefix}_payloads", rows)
 
+    def _services(self) -> None:
+        """The services whose calls are samples of channels."""
+        rows = []
+        for index, channel in enumerate(self.m.channels):
+            service = channel.service
+            if service is not None:
+                kind = {"std_srvs/Trigger": "FCSL_TRIGGER", "std_srvs/SetBool": "FCSL_SET_BOOL"}[service.type]
+                rows.append(
+                    f"{{{c_string(service.name)}, {kind}, {index}u, {c_string(service.accepted)}, "
+                    f"{c_string(service.refused)}, {service.within_ticks}u}}"
+                )
+        self.services = self._table("fcsl_service_t", f"fcsl_services_{self.m.name}", rows), len(rows)
+
     def _field_offset(self, channel: Channel) -> str:
         return self._offset(self.rows[self.by_path[self._path(channel.port)]].member)
 
@@ -273,6 +287,9 @@ class DescriptorEmitter:
         table, count = self.ros_messages
         if count:
             rows |= {"ros_messages": table, "ros_message_count": f"{count}u"}
+        table, count = self.services
+        if count:
+            rows |= {"services": table, "service_count": f"{count}u"}
         if self.payloads != "NULL":
             rows["payloads"] = self.payloads
         if self.folded != "NULL":

@@ -230,6 +230,18 @@ static int check_ros_messages(const fcsl_machine_t *machine, fcsl_error_t *error
     return 0;
 }
 
+/* A service's channel is a bool that the world writes. */
+static int check_service(const fcsl_machine_t *machine, const fcsl_service_t *service)
+{
+    if (!is_name(service->name) || service->kind > FCSL_SET_BOOL || service->channel >= machine->channel_count ||
+        !is_name(service->accepted) || service->refused == NULL || service->within_ticks == 0) {
+        return -1;
+    }
+    const fcsl_channel_t *channel = &machine->channels[service->channel];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    return channel->direction == FCSL_SENSOR && field->type == FCSL_BOOL && field->count == 1u ? 0 : -1;
+}
+
 /* No field, or a bool output. */
 static int is_arm_field(const fcsl_machine_t *machine)
 {
@@ -304,6 +316,11 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
     if (check_ros_messages(machine, error) != 0) {
         return -1;
     }
+    for (uint32_t i = 0; i < machine->service_count; i++) {
+        if (check_service(machine, &machine->services[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': service %u of its descriptor is inconsistent", name, i);
+        }
+    }
     for (uint32_t i = 0; i < machine->fault_place_count; i++) {
         if (check_fault_place(&machine->fault_places[i]) != 0) {
             return fcsl_fail(error, "machine '%s': fault place %u of its descriptor is inconsistent", name, i);
@@ -352,7 +369,9 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
                        (machine->transition_count == 0 || machine->transitions != NULL) &&
                        (machine->channel_count == 0 || machine->channels != NULL) &&
                        machine->ros_message_count <= machine->channel_count &&
-                       (machine->ros_message_count == 0 || machine->ros_messages != NULL) && machine->state_count > 0 &&
+                       (machine->ros_message_count == 0 || machine->ros_messages != NULL) &&
+                       machine->service_count <= machine->channel_count &&
+                       (machine->service_count == 0 || machine->services != NULL) && machine->state_count > 0 &&
                        machine->states != NULL;
     const int code =
         machine->init != NULL && machine->start != NULL && machine->step != NULL && machine->force_state != NULL;

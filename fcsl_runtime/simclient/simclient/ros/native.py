@@ -171,6 +171,12 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sample_input_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
     "fcsl_sample_input_counts": (POINTER(c_uint64), [ptr]),
     "fcsl_sample_input_behind_ns": (c_int64, [ptr]),
+    "fcsl_service_input_new": (ptr, [ptr, c_uint32, _ERROR]),
+    "fcsl_service_input_free": (None, [ptr]),
+    "fcsl_service_input_begin": (None, [ptr, c_int64]),
+    "fcsl_service_input_call": (c_int, [ptr, c_int, c_int64, ptr]),
+    "fcsl_service_input_poll": (c_int, [ptr, c_int64, ptr]),
+    "fcsl_service_input_end": (c_int, [ptr, c_int64, ptr]),
     "fcsl_ros_composer_new": (ptr, [POINTER(CComposerConversion), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr, POINTER(c_uint32)]),
@@ -197,7 +203,8 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def library() -> ctypes.CDLL:
-    """The runtime with the prototypes of fcsl_ros.h, fcsl_sample_input.h, fcsl_publish_queue.h and fcsl_topics.h. Raises TwinError."""
+    """The runtime with the prototypes of fcsl_ros.h, fcsl_sample_input.h, fcsl_service_input.h, fcsl_publish_queue.h and
+    fcsl_topics.h. Raises TwinError."""
     return _load(runtime_library())
 
 

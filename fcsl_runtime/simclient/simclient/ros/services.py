@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The services of a machine's `ros` blocks: calls become samples of a channel, and what the machine then does answers them."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from ctypes import Structure, byref, c_char, c_uint8
+from typing import NamedTuple
+
+from ..c_run import CError
+from ..descriptor import Service
+from ..errors import TwinError
+from ..run import Run
+from . import native
+
+
+class Answer(NamedTuple):
+    """The response of std_srvs/srv/Trigger and SetBool."""
+
+    success: bool
+    message: str
+
+
+class _CAnswer(Structure):
+    """fcsl_service_answer_t"""
+
+    _fields_ = [("success", c_uint8), ("message", c_char * 256)]
+
+    @property
+    def answer(self) -> Answer:
+        return Answer(bool(self.success), self.message.decode("utf-8", "replace"))
+
+
+class ServiceInput:
+    """Delivers the calls of a service to a run, one after another. `now_ns`: the stamp of samples."""
+
+    def __init__(self, run: Run, service: Service):
+        """Raises TwinError."""
+        self._run, self._library = run, native.library()
+        error = CError()
+        number = run.machine.services.index(service)
+        self._handle = self._library.fcsl_service_input_new(run.handle(), number, byref(error))
+        if not self._handle:
+            raise TwinError(error.text.decode("utf-8", "replace"))
+        weakref.finalize(self, self._library.fcsl_service_input_free, self._handle)
+
+    def begin(self, now_ns: int) -> None:
+        """The channel has its value, for the coming tick. No call waits."""
+        self._run.handle()
+        self._library.fcsl_service_input_begin(self._handle, now_ns)
+
+    def call(self, value: bool, now_ns: int) -> Answer | None:
+        """A call, for the coming tick; `value`: that of a SetBool. None: it waits; else another one does."""
+        self._run.handle()
+        answer = _CAnswer()
+        waits = self._library.fcsl_service_input_call(self._handle, int(value), now_ns, byref(answer)) == 0
+        return None if waits else answer.answer
+
+    def poll(self, now_ns: int) -> Answer | None:
+        """After a tick: the answer of the call that waits, once it has one."""
+        return self._ended(self._library.fcsl_service_input_poll, now_ns)
+
+    def end(self, now_ns: int) -> Answer | None:
+        """No tick follows: the answer of the call that waits, if one does."""
+        return self._ended(self._library.fcsl_service_input_end, now_ns)
+
+    def _ended(self, function: Callable[..., int], now_ns: int) -> Answer | None:
+        self._run.handle()
+        answer = _CAnswer()
+        return answer.answer if function(self._handle, now_ns, byref(answer)) else None
