@@ -6,7 +6,7 @@ This is the only Python copy of the C layout; a test compares it with the compil
 
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 
-ABI_VERSION = 12
+ABI_VERSION = 13
 NO_OFFSET = 0xFFFFFFFF
 
 #: fcsl_type_t by number, with the struct format of one scalar in native byte order.

@@ -23,6 +23,7 @@ STRUCTS = {
     "fcsl_event_t": c_machine.CEvent,
     "fcsl_events_t": c_machine.CEvents,
     "fcsl_told_event_t": c_run.CToldEvent,
+    "fcsl_service_t": c_machine.CService,
     "fcsl_machine_t": c_machine.CMachine,
     "fcsl_error_t": c_run.CError,
     "fcsl_record_options_t": c_run.CRecordOptions,
