@@ -71,6 +71,11 @@ typedef struct {
         latched_count; /* the first so many: who subscribes later, as Zenoh's advanced subscribers do, gets their last message */
     const fcsl_bus_input_t *inputs;
     uint32_t input_count;
+    /* The last so many inputs are services: queries for their keys are their messages, one at a time. What is posted for output
+     * `output_count` + i answers that of service i. Meanwhile other queries get the bytes of `busy`. */
+    uint32_t service_count;
+    const void *busy;
+    uint32_t busy_bytes;
     const char *const *
         tokens; /* while this session lives, others see these; the session's number stands for `{zid}` in them, or else behind them */
     uint32_t token_count;

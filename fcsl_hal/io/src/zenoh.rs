@@ -136,9 +136,31 @@ struct Output {
     attachment: Option<Attachment>,
 }
 
+/// A query that waits for its reply.
+type Waiting = Arc<Mutex<Option<Query>>>;
+
+struct Service {
+    key: KeyExpr<'static>,
+    waiting: Waiting,
+}
+
+/// What rmw_zenoh wants beside a reply: what stood beside the query, with the time of now.
+fn replied_attachment(query: &Query) -> Option<ZBytes> {
+    let mut bytes = query.attachment()?.to_bytes().into_owned();
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let now_ns = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+    bytes.get_mut(8..16)?.copy_from_slice(&now_ns.to_le_bytes());
+    Some(ZBytes::from(bytes))
+}
+
+fn reply(query: &Query, key: &KeyExpr<'static>, bytes: impl Into<ZBytes>) -> Result<(), zenoh::Error> {
+    query.reply(key, bytes).attachment(replied_attachment(query)).wait()
+}
+
 pub struct Zenoh {
     inputs: Vec<KeyExpr<'static>>,
     outputs: Vec<Output>,
+    services: Vec<Service>,
     /// What queries get; empty: nothing.
     answers: Vec<Arc<Mutex<ZBytes>>>,
     /// Of a session that answers queries.
@@ -169,6 +191,7 @@ impl Zenoh {
         Ok(Self {
             inputs: Vec::new(),
             outputs: Vec::new(),
+            services: Vec::new(),
             answers: Vec::new(),
             replier: None,
             tokens: Vec::new(),
@@ -281,6 +304,40 @@ impl Zenoh {
         queryable.allowed_origin(Locality::Remote).background().wait()
     }
 
+    fn declare_service(&mut self, number: u32, key: &str, most: usize, busy: &[u8]) -> Result<(), zenoh::Error> {
+        let key = KeyExpr::new(key.to_owned())?;
+        let (own, busy) = (key.clone(), ZBytes::from(busy.to_vec()));
+        let waiting = Waiting::default();
+        self.services.push(Service { key: key.clone(), waiting: waiting.clone() });
+        let replier = self.replier()?;
+        let events = self.events.clone();
+        let callback = move |query: Query| {
+            let Some(request) = query.payload().map(|payload| payload.to_bytes().into_owned()) else { return };
+            let Ok(mut waiting) = waiting.lock() else { return };
+            if request.len() > most {
+                return;
+            }
+            if waiting.is_some() {
+                let (own, busy) = (own.clone(), busy.clone());
+                let _ = replier.try_send(Box::new(move || {
+                    let _ = reply(&query, &own, busy); // who asked may be gone
+                }));
+                return;
+            }
+            *waiting = Some(query);
+            drop(waiting);
+            events.sample(number, Some(&request));
+        };
+        let queryable = self.session.declare_queryable(key).complete(true).callback(callback);
+        queryable.allowed_origin(Locality::Remote).background().wait()
+    }
+
+    fn reply(&self, service: usize, bytes: &[u8]) -> Result<(), Reason> {
+        let Service { key, waiting } = self.services.get(service).ok_or("there is no such output")?;
+        let query = waiting.lock().map_err(|_| "a query is coming in")?.take().ok_or("no query waits")?;
+        reply(&query, key, bytes.to_vec()).map_err(reason_of)
+    }
+
     fn answer(&self, answer: u32, bytes: &[u8]) -> Result<(), Reason> {
         let answer = self.answers.get(answer as usize).ok_or("there is no such answer")?;
         let bytes = ZBytes::from(bytes.to_vec());
@@ -317,7 +374,9 @@ impl Zenoh {
     }
 
     fn put(&self, output: u32, bytes: &[u8]) -> Result<(), Reason> {
-        let output = self.outputs.get(output as usize).ok_or("there is no such output")?;
+        let Some(output) = self.outputs.get(output as usize) else {
+            return self.reply(output as usize - self.outputs.len(), bytes);
+        };
         let attachment = output.attachment.as_ref().map(Attachment::next);
         let Some(latch) = &output.latch else {
             return output.publisher.put(bytes).attachment(attachment).wait().map_err(reason_of);
@@ -463,6 +522,26 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_answer(
     unsafe {
         let bytes = c::bytes(bytes, size, "the answer");
         declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_answer(key, bytes?))
+    }
+}
+
+/// # Safety
+/// As zenoh_session.h: `busy_size` readable bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_service(
+    zenoh: *mut Zenoh,
+    number: u32,
+    key: *const c_char,
+    most: usize,
+    busy: *const u8,
+    busy_size: usize,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe {
+        let busy = c::bytes(busy, busy_size, "the answer");
+        declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_service(number, key, most, busy?))
     }
 }
 

@@ -123,14 +123,14 @@ static void *array(uint32_t count, size_t bytes)
 
 static int allocate(fcsl_bus_t *bus, const fcsl_bus_options_t *options)
 {
-    bus->matched = array(options->output_count, sizeof bus->matched[0]);
+    bus->output_count = options->output_count + options->service_count;
+    bus->matched = array(bus->output_count, sizeof bus->matched[0]);
     bus->inboxes = array(options->input_count, sizeof bus->inboxes[0]);
     bus->token_counts = array(options->watched_count, sizeof bus->token_counts[0]);
     if (bus->matched == NULL || bus->inboxes == NULL || bus->token_counts == NULL ||
         ring_open(&bus->ring, options->ring_bytes) != 0) {
         return -1;
     }
-    bus->output_count = options->output_count;
     bus->watched_count = options->watched_count;
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
@@ -180,7 +180,8 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_erro
 {
     fcsl_zenoh_t *zenoh = bus->zenoh;
     int failed = 0;
-    for (uint32_t i = 0; i < options->input_count && !failed; i++) {
+    const uint32_t subscribed = options->input_count - options->service_count;
+    for (uint32_t i = 0; i < subscribed && !failed; i++) {
         failed = fcsl_zenoh_declare_input(zenoh, i, options->inputs[i].key, error->text, sizeof error->text);
     }
     if (options->strays != NULL && !failed) {
@@ -189,6 +190,11 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_erro
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
         failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, i < options->latched_count,
                                            options->attaches, error->text, sizeof error->text);
+    }
+    for (uint32_t i = subscribed; i < options->input_count && !failed; i++) {
+        const fcsl_bus_input_t *input = &options->inputs[i];
+        failed = fcsl_zenoh_declare_service(zenoh, i, input->key, input->bytes, options->busy, options->busy_bytes,
+                                            error->text, sizeof error->text);
     }
     for (uint32_t i = 0; i < options->answer_count && !failed; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];

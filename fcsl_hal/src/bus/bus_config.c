@@ -66,6 +66,10 @@ static int check_inputs(const fcsl_bus_options_t *options, fcsl_error_t *error)
         return fcsl_fail(error, "the bus has %u inputs; at most %u are possible", options->input_count,
                          FCSL_BUS_KEYS_MAX);
     }
+    if (options->service_count > options->input_count || options->busy_bytes > FCSL_BUS_MESSAGE_MAX) {
+        return fcsl_fail(error, "the bus has %u services of %u inputs, and %u bytes for a busy one",
+                         options->service_count, options->input_count, options->busy_bytes);
+    }
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
         if (check_key("an input", input->key, FCSL_BUS_KEY_MAX, "$?#", error) != 0) {

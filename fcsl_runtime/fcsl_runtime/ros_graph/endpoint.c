@@ -120,6 +120,9 @@ static int write_for_bridge(ros_endpoint_t *endpoint, const char *name, const ro
     write_word(name, strlen(name), SLASH, topic);
     write_word(quality->type, strlen(quality->type), SLASH, type);
     (void)snprintf(endpoint->key, sizeof endpoint->key, "%s", name);
+    if (quality->kind == ROS_SERVICE) {
+        return snprintf(endpoint->token, sizeof endpoint->token, "@/{zid}/@ros2_lv/SS/%s/%s", topic, type);
+    }
     return snprintf(endpoint->token, sizeof endpoint->token, "@/{zid}/@ros2_lv/%s/%s/%s/:%d:%d:0,%u:typehash=%s;",
                     quality->kind == ROS_PUBLISHER ? "MP" : "MS", topic, type, quality->reliable, quality->latched,
                     quality->depth, quality->hash);
@@ -155,7 +158,8 @@ static int write_for_rmw_zenoh(ros_endpoint_t *endpoint, const ros_place_t *plac
         return fcsl_fail(error, "topic '%.100s' of type %.100s: its key has more than %u bytes", name, quality->type,
                          FCSL_BUS_KEY_MAX);
     }
-    const int head = write_head(endpoint->token, place, number + 1u, quality->kind == ROS_PUBLISHER ? "MP" : "MS");
+    static const char *const KINDS[] = {[ROS_PUBLISHER] = "MP", [ROS_SUBSCRIPTION] = "MS", [ROS_SERVICE] = "SS"};
+    const int head = write_head(endpoint->token, place, number + 1u, KINDS[quality->kind]);
     if (head < 0 || head >= (int)sizeof endpoint->token) {
         return head;
     }

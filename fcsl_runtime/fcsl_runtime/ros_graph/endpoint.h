@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A publisher or subscription in a ROS 2 graph: its key on Zenoh, and the liveliness token that announces it, as the
+ * A publisher, subscription or service in a ROS 2 graph: its key on Zenoh, and the liveliness token that announces it, as the
  * middleware of the graph reads them; and the session that holds them.
  */
 #ifndef FCSL_ROS_GRAPH_ENDPOINT_H
@@ -25,11 +25,11 @@ typedef struct {
 
 typedef char ros_token_t[FCSL_BUS_TOKEN_MAX + 1];
 
-typedef enum { ROS_PUBLISHER, ROS_SUBSCRIPTION } ros_endpoint_kind_t;
+typedef enum { ROS_PUBLISHER, ROS_SUBSCRIPTION, ROS_SERVICE } ros_endpoint_kind_t;
 
 typedef struct {
     ros_endpoint_kind_t kind;
-    const char *type; /* "pkg/msg/Name" */
+    const char *type; /* "pkg/msg/Name", "pkg/srv/Name" */
     const char *hash; /* "RIHS01_…" */
     int reliable;
     int latched; /* transient local */
@@ -46,7 +46,7 @@ typedef struct {
 int ros_place_read(ros_place_t *place, const char *address, const char *name_space, const char *node,
                    fcsl_error_t *error);
 
-/* The endpoint of topic `name` ("imu/data"; "/clock" is outside of the namespace), behind `machine` if that is not null. `number`: of it
+/* The endpoint of topic or service `name` ("imu/data"; "/clock" is outside of the namespace), behind `machine` if that is not null. `number`: of it
  * in its session, from 0. Returns 0, or -1 with `error`. */
 int ros_endpoint_write(ros_endpoint_t *endpoint, const ros_place_t *place, const char *machine, const char *name,
                        const ros_quality_t *quality, uint32_t number, fcsl_error_t *error);

@@ -13,6 +13,8 @@
 #include "fcsl/fcsl_error.h"
 #include "endpoint.h"
 #include "fcsl/fcsl_sample_input.h"
+#include "fcsl/fcsl_service_input.h"
+#include "service_message.h"
 
 enum {
     MESSAGE_BYTES = 65536, /* of the longest sensor message that is taken */
@@ -21,6 +23,15 @@ enum {
     RING_BYTES_MIN = 256,
     DEPTH = 10, /* of what is read, best effort, and of commands, reliable */
     CLOSE_MS = 2000
+};
+
+/* With the hashes of their definitions in Jazzy. */
+static const struct {
+    const char *type;
+    const char *hash;
+} SERVICES[] = {
+    [FCSL_TRIGGER] = {"std_srvs/srv/Trigger", "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"},
+    [FCSL_SET_BOOL] = {"std_srvs/srv/SetBool", "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"},
 };
 
 /* What stands under `hal.`. */
@@ -33,6 +44,9 @@ typedef struct {
     uint64_t commands;
     uint64_t commands_refused;
     uint64_t commands_dropped;
+    uint64_t calls;
+    uint64_t calls_accepted;
+    uint64_t calls_malformed;
 } counters_t;
 
 #define COUNTER(member, doc)       FCSL_WIRE_COUNTER(counters_t, #member, member, doc)
@@ -60,6 +74,9 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER(commands, "messages of actuators and reports that were put on the bus"),
     COUNTER(commands_refused, "actuator messages not made: a value does not fit its field"),
     COUNTER(commands_dropped, "actuator messages without room on the bus"),
+    COUNTER(calls, "calls of services that the machine got"),
+    COUNTER(calls_accepted, "calls of services that were answered with success"),
+    COUNTER(calls_malformed, "calls of services that are no little-endian CDR of their type"),
 };
 
 typedef struct {
@@ -82,6 +99,9 @@ typedef struct {
     uint32_t sensor_count;
     output_t *outputs; /* its outputs, actuators and reports */
     uint32_t output_count;
+    fcsl_service_input_t **services; /* the bus's inputs behind those of sensors, and its outputs behind the others */
+    uint32_t service_count;
+    int has_begun;
     uint8_t *message;
     int64_t now_ns; /* ROS time of the tick */
     counters_t counters;
@@ -96,6 +116,55 @@ static int64_t ros_time_ns(void)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
+static void answer(hal_t *hal, uint32_t service, const fcsl_service_answer_t *answered)
+{
+    uint8_t cdr[SERVICE_RESPONSE_BYTES];
+    const size_t size = service_response_write(cdr, answered);
+    hal->counters.calls_accepted += answered->success;
+    if (fcsl_bus_post(hal->bus, hal->output_count + service, cdr, size) != 0) {
+        hal->counters.commands_dropped++;
+    }
+}
+
+/* The bus hands out one call at a time. */
+static void take_calls(hal_t *hal)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
+    for (uint32_t i = 0; i < hal->service_count; i++) {
+        size_t size = 0;
+        int value = 0;
+        fcsl_service_answer_t refused;
+        if (!hal->has_begun) {
+            fcsl_service_input_begin(hal->services[i], hal->now_ns);
+        }
+        if (!fcsl_bus_take(hal->bus, hal->sensor_count + i, hal->message, &size)) {
+            continue;
+        }
+        if (service_request_read(machine->services[i].kind, hal->message, size, &value) != 0) {
+            hal->counters.calls_malformed++;
+            refused = (fcsl_service_answer_t){.message = "the request is no CDR of its type"};
+            answer(hal, i, &refused);
+        } else if (fcsl_service_input_call(hal->services[i], value, hal->now_ns, &refused) == 0) {
+            hal->counters.calls++;
+        } else {
+            answer(hal, i, &refused);
+        }
+    }
+    hal->has_begun = 1;
+}
+
+typedef int ended_t(fcsl_service_input_t *input, int64_t now_ns, fcsl_service_answer_t *answered);
+
+static void answer_calls(hal_t *hal, ended_t *ended)
+{
+    fcsl_service_answer_t answered;
+    for (uint32_t i = 0; i < hal->service_count; i++) {
+        if (ended(hal->services[i], hal->now_ns, &answered)) {
+            answer(hal, i, &answered);
+        }
+    }
+}
+
 static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     hal_t *hal = ctx;
@@ -108,6 +177,7 @@ static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, const fcsl_sink_t 
             (void)fcsl_sample_input_deliver(hal->sensors[i].input, hal->message, size, hal->now_ns, NULL);
         }
     }
+    take_calls(hal);
     return FCSL_HAL_OK;
 }
 
@@ -136,6 +206,7 @@ static fcsl_hal_status_t ros_command(void *ctx, const fcsl_message_t *message)
     (void)message; /* the same values, in another form */
     post(hal, FCSL_ACTUATOR, fcsl_run_actuator_data(hal->run));
     post(hal, FCSL_REPORT, fcsl_run_data(hal->run));
+    answer_calls(hal, fcsl_service_input_poll);
     return FCSL_HAL_OK;
 }
 
@@ -146,6 +217,9 @@ static fcsl_hal_status_t ros_arm(void *ctx, int armed)
     const uint8_t *safe = fcsl_run_safe_data(hal->run);
     if (!armed && safe != NULL) {
         post(hal, FCSL_ACTUATOR, safe);
+    }
+    if (!armed) {
+        answer_calls(hal, fcsl_service_input_end);
     }
     return FCSL_HAL_OK;
 }
@@ -198,13 +272,17 @@ static void ros_close(void *ctx)
     for (uint32_t i = 0; i < hal->output_count; i++) {
         fcsl_ros_composer_free(hal->outputs[i].composer);
     }
+    for (uint32_t i = 0; i < hal->service_count; i++) {
+        fcsl_service_input_free(hal->services[i]);
+    }
     free(hal->sensors);
     free(hal->outputs);
+    free((void *)hal->services);
     free(hal->message);
     free(hal);
 }
 
-/* The endpoints of all topics, those of sensors before those of outputs. */
+/* The endpoints of all topics, those of sensors before those of outputs, and of services. */
 static int name_topics(const hal_t *hal, ros_endpoint_t *endpoints, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
@@ -222,20 +300,39 @@ static int name_topics(const hal_t *hal, ros_endpoint_t *endpoints, fcsl_error_t
             return -1;
         }
     }
+    for (uint32_t i = 0; i < hal->service_count; i++) {
+        const fcsl_service_t *service = &machine->services[i];
+        const uint32_t number = hal->sensor_count + hal->output_count + i;
+        const ros_quality_t quality = {.kind = ROS_SERVICE,
+                                       .type = SERVICES[service->kind].type,
+                                       .hash = SERVICES[service->kind].hash,
+                                       .reliable = 1,
+                                       .depth = DEPTH};
+        if (ros_endpoint_write(&endpoints[number], &hal->place, NULL, service->name, &quality, number, error) != 0) {
+            return -1;
+        }
+    }
     return 0;
 }
 
 static int open_session(hal_t *hal, const ros_endpoint_t *endpoints, const char **texts, fcsl_bus_input_t *inputs,
                         fcsl_error_t *error)
 {
-    const uint32_t count = hal->sensor_count + hal->output_count;
-    uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
+    const uint32_t topics = hal->sensor_count + hal->output_count;
+    const uint32_t count = topics + hal->service_count;
+    static const fcsl_service_answer_t BUSY = {.message = "busy: another call waits for its answer"};
+    uint8_t busy[SERVICE_RESPONSE_BYTES];
+    uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED + hal->service_count * (SERVICE_RESPONSE_BYTES + ENTRY_BYTES_MAX);
     for (uint32_t i = 0; i < count; i++) {
         texts[i] = endpoints[i].key;
         texts[count + i] = endpoints[i].token;
     }
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
         inputs[i] = (fcsl_bus_input_t){.key = endpoints[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
+    }
+    for (uint32_t i = 0; i < hal->service_count; i++) {
+        inputs[hal->sensor_count + i] =
+            (fcsl_bus_input_t){.key = endpoints[topics + i].key, .bytes = SERVICE_REQUEST_BYTES, .depth = 1};
     }
     for (uint32_t i = 0; i < hal->output_count; i++) {
         tick_bytes += hal->outputs[i].size + ENTRY_BYTES_MAX;
@@ -244,7 +341,10 @@ static int open_session(hal_t *hal, const ros_endpoint_t *endpoints, const char 
                                         .outputs = texts + hal->sensor_count,
                                         .output_count = hal->output_count,
                                         .inputs = inputs,
-                                        .input_count = hal->sensor_count};
+                                        .input_count = hal->sensor_count + hal->service_count,
+                                        .service_count = hal->service_count,
+                                        .busy = busy,
+                                        .busy_bytes = (uint32_t)service_response_write(busy, &BUSY)};
     return ros_session_open(&hal->place, &options, texts + count, count, &hal->bus, error);
 }
 
@@ -252,7 +352,7 @@ static int ros_open(fcsl_hal_t *handle, fcsl_error_t *error)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
-    const size_t count = (size_t)hal->sensor_count + hal->output_count;
+    const size_t count = (size_t)hal->sensor_count + hal->output_count + hal->service_count;
     ros_endpoint_t *endpoints = calloc(count, sizeof *endpoints);
     const char **texts = calloc(2u * count + 1u, sizeof *texts);
     fcsl_bus_input_t *inputs = calloc(count, sizeof *inputs);
@@ -298,7 +398,8 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
     size_t longest = MESSAGE_BYTES;
     hal->sensors = calloc(machine->ros_message_count + 1u, sizeof *hal->sensors);
     hal->outputs = calloc(machine->ros_message_count + 1u, sizeof *hal->outputs);
-    if (hal->sensors == NULL || hal->outputs == NULL) {
+    hal->services = calloc(machine->service_count + 1u, sizeof(fcsl_service_input_t *));
+    if (hal->sensors == NULL || hal->outputs == NULL || hal->services == NULL) {
         return fcsl_fail(error, "out of memory for the ROS 2 graph");
     }
     int failed = 0;
@@ -307,6 +408,11 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
         longest = message->composer->size > longest ? message->composer->size : longest;
         failed = message->direction == FCSL_SENSOR ? add_sensor(hal, message, error) : add_output(hal, message, error);
     }
+    for (uint32_t i = 0; i < machine->service_count && !failed; i++) {
+        hal->services[i] = fcsl_service_input_new(hal->run, i, error);
+        failed = hal->services[i] == NULL;
+        hal->service_count += failed ? 0u : 1u;
+    }
     hal->message = malloc(longest);
     return failed ? -1 : hal->message == NULL ? fcsl_fail(error, "out of memory for the ROS 2 graph") : 0;
 }
@@ -314,9 +420,9 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
 int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(run);
-    if (machine->ros_message_count == 0) {
+    if (machine->ros_message_count == 0 && machine->service_count == 0) {
         return fcsl_fail(error,
-                         "no channel of machine '%.100s' has a topic: write a `ros` block for it in the machine JSON",
+                         "no channel of machine '%.100s' has a topic or a service: write a `ros` block for it in the machine JSON",
                          machine->name);
     }
     hal_t *self = calloc(1, sizeof *self);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A command that says which measurement came last."""
+"""A command that says which measurement came last, and two requests: `mark` is refused unless `hold` was accepted."""
 
 
 class Imu:
@@ -10,8 +10,10 @@ class Imu:
 
 
 class Echo:
-    inputs = {"rate": "f64[3] rad/s"}
-    outputs = {"speed": "f64 m/s"}
+    inputs = {"rate": "f64[3] rad/s", "hold": "bool", "mark": "bool"}
+    outputs = {"speed": "f64 m/s", "held": "bool", "marked": "bool"}
 
     def execute(self):
         self.speed = self.rate[0]
+        self.held = self.hold
+        self.marked = self.mark and self.hold
