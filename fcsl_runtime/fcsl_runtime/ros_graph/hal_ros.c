@@ -30,8 +30,10 @@ static const struct {
     const char *type;
     const char *hash;
 } SERVICES[] = {
-    [FCSL_TRIGGER] = {"std_srvs/srv/Trigger", "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"},
-    [FCSL_SET_BOOL] = {"std_srvs/srv/SetBool", "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"},
+    [FCSL_TRIGGER] = {"std_srvs/srv/Trigger",
+                      "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"},
+    [FCSL_SET_BOOL] = {"std_srvs/srv/SetBool",
+                       "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"},
 };
 
 /* What stands under `hal.`. */
@@ -322,7 +324,8 @@ static int open_session(hal_t *hal, const ros_endpoint_t *endpoints, const char 
     const uint32_t count = topics + hal->service_count;
     static const fcsl_service_answer_t BUSY = {.message = "busy: another call waits for its answer"};
     uint8_t busy[SERVICE_RESPONSE_BYTES];
-    uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED + hal->service_count * (SERVICE_RESPONSE_BYTES + ENTRY_BYTES_MAX);
+    uint32_t tick_bytes =
+        RING_BYTES_MIN / TICKS_POSTED + hal->service_count * (SERVICE_RESPONSE_BYTES + ENTRY_BYTES_MAX);
     for (uint32_t i = 0; i < count; i++) {
         texts[i] = endpoints[i].key;
         texts[count + i] = endpoints[i].token;
@@ -421,9 +424,10 @@ int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_
 {
     const fcsl_machine_t *machine = fcsl_run_machine(run);
     if (machine->ros_message_count == 0 && machine->service_count == 0) {
-        return fcsl_fail(error,
-                         "no channel of machine '%.100s' has a topic or a service: write a `ros` block for it in the machine JSON",
-                         machine->name);
+        return fcsl_fail(
+            error,
+            "no channel of machine '%.100s' has a topic or a service: write a `ros` block for it in the machine JSON",
+            machine->name);
     }
     hal_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
