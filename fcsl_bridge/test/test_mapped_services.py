@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from bridge_harness import Domain
-from controller_client import ACTIVATE, DEACTIVATE, ControllerClient
+from controller_client import ACTIVATE, CONFIGURE, DEACTIVATE, ControllerClient
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, Trigger
@@ -96,10 +96,10 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Vehicle:
     """A controller of machine `gate`, and its caller."""
 
-    def __init__(self, domain: Domain, library: Path):
+    def __init__(self, domain: Domain, library: Path, **parameters: bool):
         self.bag = domain.folder / "bag"
         self.listener = domain.listener()
-        self.process = domain.start("controller_node", machine=library, record=self.bag, mode="realtime")
+        self.process = domain.start("controller_node", machine=library, record=self.bag, mode="realtime", **parameters)
         self.node = ControllerClient(self.listener, "/gate")
         self._machine = ControllerClient(self.listener, "")
         self.listener.subscribe(Int32, "/launches", qos.COMMAND)
@@ -173,3 +173,11 @@ def test_a_call_that_waits_is_answered_at_the_end(vehicle: Vehicle) -> None:
         (False, "the machine stopped before it answered"),
         (False, "the node is inactive: no tick is made"),  # it had not been taken
     )
+
+
+def test_before_the_first_tick(domain: Domain, library: Path) -> None:
+    vehicle = Vehicle(domain, library, autostart=False)
+    assert vehicle.node.change(CONFIGURE)
+    assert vehicle.launch() == (False, "the node is inactive: no tick is made")
+    assert vehicle.node.change(ACTIVATE)
+    assert vehicle.arm(False)[0]
