@@ -114,7 +114,9 @@ typedef struct {
 static int64_t ros_time_ns(void)
 {
     struct timespec now;
-    (void)clock_gettime(CLOCK_REALTIME, &now);
+    if (clock_gettime(CLOCK_REALTIME, &now) != 0) {
+        return 0; /* a stamp that says nothing */
+    }
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 

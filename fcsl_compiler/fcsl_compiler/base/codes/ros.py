@@ -24,9 +24,9 @@ ROS_CODES: dict[str, Code] = {
     "E236": Code(
         "a message that no channel can be mapped to",
         "`ros` maps a channel to any message whose definition is standard, installed, or stored beside the machine by "
-        "`fcsl interfaces`. Where it is stored and installed, both must be equal. Refused are messages with an unbounded "
-        "list of bytes (images, point clouds: bulk data), with a wstring, or of more than 65536 bytes: let a node reduce "
-        "them to numbers. All outputs of a machine are also in its own messages, one per instance, without any mapping.",
+        "`fcsl interfaces`. Where it is stored and installed, both must be equal. Refused are messages without fields, with "
+        "an unbounded list of bytes (images, point clouds: bulk data), with a wstring, or of more than 65536 bytes: let a "
+        "node reduce them to numbers. All outputs of a machine are also in its own messages, one per instance, without any mapping.",
         Kind.JSON,
         _mapped('"type": "sensor_msgs/IMU", "field": "angular_velocity"'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
