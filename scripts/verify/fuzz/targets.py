@@ -201,6 +201,16 @@ TARGETS = (
         longest=512,
     ),
     Target(
+        "service_request",
+        "calls of ROS 2 services",
+        "ROS 2 graph",
+        Defect(
+            "fcsl_runtime/fcsl_runtime/ros_graph/service_message.c",
+            "size <= HEADER || cdr[HEADER] > 1",
+            "cdr[HEADER] > 1",
+        ),
+    ),
+    Target(
         "ros_deliver",
         "ROS 2 messages into a machine, their times",
         "ROS 2",
