@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import queue
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -77,10 +78,24 @@ class Graph:
         return answered[0].success, answered[0].message, answered[1]
 
 
+def machine(folder: Path) -> Path:
+    """That of `make interop`, with an actuator that `hold` arms, and more patience than a busy computer needs."""
+    config = json.loads(ECHO.read_text())
+    shutil.copytree(ECHO.parent / "algorithms", folder / "algorithms")
+    config["arm"] = "echo.held"
+    for channel in config["channels"]:
+        if channel["name"] == "cmd":
+            channel["safe"] = -1.0
+        if channel["name"] == "mark":
+            channel["ros"]["within_s"] = 5.0
+    (folder / "echo.json").write_text(json.dumps(config))
+    return folder / "echo.json"
+
+
 @contextmanager
 def flying(folder: Path, is_rmw: bool) -> Iterator[tuple[Graph, subprocess.Popen[str]]]:
     endpoint = free_endpoint()
-    subprocess.run(["fcslc", "build", ECHO, "-o", folder], check=True, capture_output=True)
+    subprocess.run(["fcslc", "build", machine(folder), "-o", folder], check=True, capture_output=True)
     place = f"rmw_zenoh:{zenoh_locator(endpoint)}" if is_rmw else endpoint
     line = ["fcsl-fc", folder / "libecho.so", "--hal", f"ros:{place}", "--namespace", "r1", "--record", folder / "bag"]
     line += ["--summary", folder / "summary.json"]
@@ -135,6 +150,7 @@ def test_calls_are_answered_by_what_the_machine_did(
         malformed = graph.send("hold", SetBool, b"\0\1\0\0\7").get(timeout=LONG_S)
         assert malformed is not None and malformed[0].message == "the request is no CDR of its type"
         assert graph.send("hold", SetBool, bytes(65)).get(timeout=LONG_S) is None
+        assert graph.send("hold", SetBool, b"").get(timeout=LONG_S) is None
         assert graph.call("hold", SetBool, data=True)[0]
 
         assert graph.call("hold", SetBool, data=False)[0]
@@ -146,6 +162,7 @@ def test_calls_are_answered_by_what_the_machine_did(
         _, complaint = fc.communicate(timeout=LONG_S)
     assert fc.returncode == 0, complaint
     counted = json.loads((tmp_path / "summary.json").read_text())["hal"]
+    assert counted["wrong_size"] == 2
     assert counted["calls"] in (7, 8) and counted["calls_accepted"] == 5 and counted["calls_malformed"] == 1
     replayed = subprocess.run(
         ["fcsl", "replay", "--library", tmp_path / "libecho.so", tmp_path / "bag"],

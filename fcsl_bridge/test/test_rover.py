@@ -80,6 +80,13 @@ class Robot:
         self._ticks = 0
         publishers = [self._clock, self.wheels._states, *self._operator.values()]
         self.listener.until(lambda: all(p.get_subscription_count() == 1 for p in publishers))
+        for _ in range(60):  # answers are lost until the node has found the wheels
+            self._send()
+            again = time.monotonic() + 1.0
+            self.listener.until(lambda: self.wheels.commands > 0 or time.monotonic() > again)  # noqa: B023
+            if self.wheels.commands:
+                return
+        raise AssertionError("no command has come")
 
     def say(self, mode: int | None = None, speed: float = 0.0, yaw_rate: float = 0.0, stop: bool = False) -> None:
         """mode: None for nothing at all from now on."""
@@ -92,12 +99,8 @@ class Robot:
         """So much time, tick by tick: each is answered by a command."""
         for _ in range(round(seconds * HZ)):
             answered = self.wheels.commands
-            while (
-                self.wheels.commands == answered
-            ):  # the answer to the first is lost until the node has found the wheels
-                self._send()
-                again = time.monotonic() + 1.0
-                self.listener.until(lambda: self.wheels.commands > answered or time.monotonic() > again)  # noqa: B023
+            self._send()
+            self.listener.until(lambda: self.wheels.commands > answered)  # noqa: B023
             self.wheels.turn()
 
     def _send(self) -> None:

@@ -147,7 +147,10 @@ def run_node(
             # gone holds what DomainParticipant::set_listener waits for.
             with suppress(OSError):
                 sys.stdout.flush()
-            exit_within(_DESTROY_S, status)
+            try:
+                exit_within(_DESTROY_S, status)
+            except TwinError as error:
+                print(f"{name}: {error}", file=sys.stderr)
             node.destroy_node()
         rclpy.try_shutdown()
     return status

@@ -76,7 +76,7 @@ class FreeRunning:
         self._services.take(now_ns, missing)
         configured.run.step(1)
         configured.show(stamp_ns)
-        self._services.answer(now_ns)
+        self._services.answer()
 
     def _diagnose(self) -> None:
         """Once per second, in the slack."""
@@ -96,7 +96,7 @@ class FreeRunning:
 
     def rest(self) -> None:
         """While inactive."""
-        self._services.refuse(self.now_ns())
+        self._services.refuse()
 
     def now_ns(self) -> int:
         """The time that a message of now is stamped with."""
@@ -117,7 +117,7 @@ class FreeRunning:
 
     def close(self) -> None:
         gc.unfreeze()
-        self._services.refuse(self.now_ns())
+        self._services.refuse()
         self._services.close()
         self._inputs.close()
         self._time.close()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from rclpy.node import Node
@@ -14,6 +15,8 @@ from simclient.run import Run
 from ..base.polling import PolledService
 
 _KINDS = {"std_srvs/srv/Trigger": Trigger, "std_srvs/srv/SetBool": SetBool}
+#: Requests of a service that are looked at before a tick.
+_AT_ONCE = 10
 _INACTIVE = Answer(False, "the node is inactive: no tick is made")
 
 
@@ -39,15 +42,15 @@ class Services:
             if one.channel not in missing:
                 one.take(now_ns)
 
-    def answer(self, now_ns: int) -> None:
+    def answer(self) -> None:
         """After a tick."""
         for one in self._services:
-            one.answer(one.input.poll(now_ns))
+            one.answer(one.input.poll())
 
-    def refuse(self, now_ns: int) -> None:
-        """Answers all calls while no tick is made."""
+    def refuse(self) -> None:
+        """Answers calls while no tick is made."""
         for one in self._services:
-            one.refuse(now_ns)
+            one.refuse()
 
     def close(self) -> None:
         for one in self._services:
@@ -60,8 +63,9 @@ class _Service:
         self._header: Any = None  # of the call that waits
 
     def take(self, now_ns: int) -> None:
-        while (taken := self.service.take()) is not None:
-            request, header = taken
+        if not self.input.prepare(now_ns):
+            return
+        for request, header in self._requests():
             refused = self.input.call(getattr(request, "data", True), now_ns)
             if refused is None:
                 self._header = header
@@ -72,7 +76,15 @@ class _Service:
         if answer is not None:
             self.service.answer(answer, self._header)
 
-    def refuse(self, now_ns: int) -> None:
-        self.answer(self.input.end(now_ns))
-        while (taken := self.service.take()) is not None:
-            self.service.answer(_INACTIVE, taken[1])
+    def refuse(self) -> None:
+        self.answer(self.input.end())
+        for _, header in self._requests():
+            self.service.answer(_INACTIVE, header)
+
+    def _requests(self) -> Iterator[tuple[Any, Any]]:
+        """Those that are there, a few: whoever sends without an end must not hold up the tick."""
+        for _ in range(_AT_ONCE):
+            taken = self.service.take()
+            if taken is None:
+                return
+            yield taken

@@ -37,10 +37,10 @@ class MachineTexts:
 
 
 def message_types(keys: dict[str, Any]) -> list[str]:
-    """The messages that the channels of a machine JSON name."""
+    """The messages that the channels of a machine JSON name; services have none."""
     channels = keys.get("channels")
     mappings = [c.get("ros") for c in (channels if isinstance(channels, list) else ()) if isinstance(c, dict)]
-    types = [ros.get("type") for ros in mappings if isinstance(ros, dict)]
+    types = [ros.get("type") for ros in mappings if isinstance(ros, dict) and "service" not in ros]
     return list(dict.fromkeys(type_ for type_ in types if isinstance(type_, str)))
 
 

@@ -3,10 +3,11 @@
 
 use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
+use std::io::Read;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{sync_channel, SyncSender};
 use std::sync::{Arc, Mutex};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
@@ -80,6 +81,9 @@ impl Drop for Events {
 const QUERIES_MAX: usize = 8;
 
 type Reply = Box<dyn FnOnce() + Send>;
+
+/// How long the end of a session waits for replies.
+const DRAIN: Duration = Duration::from_millis(200);
 
 /// A thread that replies until all senders are gone. A reply waits for a slow receiver, and Zenoh's own threads, which serve all
 /// sessions of the process, must not.
@@ -312,11 +316,15 @@ impl Zenoh {
         let replier = self.replier()?;
         let events = self.events.clone();
         let callback = move |query: Query| {
-            let Some(request) = query.payload().map(|payload| payload.to_bytes().into_owned()) else { return };
-            let Ok(mut waiting) = waiting.lock() else { return };
-            if request.len() > most {
-                return;
+            let mut request = Vec::new();
+            if let Some(payload) = query.payload() {
+                // One byte more than is taken, so that who counts sees that it is too long.
+                let _ = payload.reader().take(most as u64 + 1).read_to_end(&mut request);
             }
+            if request.is_empty() || request.len() > most {
+                return events.sample(number, (!request.is_empty()).then_some(&request));
+            }
+            let Ok(mut waiting) = waiting.lock() else { return };
             if waiting.is_some() {
                 let (own, busy) = (own.clone(), busy.clone());
                 let _ = replier.try_send(Box::new(move || {
@@ -335,7 +343,11 @@ impl Zenoh {
     fn reply(&self, service: usize, bytes: &[u8]) -> Result<(), Reason> {
         let Service { key, waiting } = self.services.get(service).ok_or("there is no such output")?;
         let query = waiting.lock().map_err(|_| "a query is coming in")?.take().ok_or("no query waits")?;
-        reply(&query, key, bytes.to_vec()).map_err(reason_of)
+        let replier = self.replier.as_ref().ok_or("nobody replies")?;
+        let (key, bytes) = (key.clone(), bytes.to_vec());
+        // Not here: it waits for a slow receiver as long as the query says, and messages wait behind it.
+        let send = move || drop(reply(&query, &key, bytes));
+        replier.try_send(Box::new(send)).map_err(|_| Reason::from("too many queries wait for their replies"))
     }
 
     fn answer(&self, answer: u32, bytes: &[u8]) -> Result<(), Reason> {
@@ -387,6 +399,15 @@ impl Zenoh {
         *last = Some(Kept { bytes: bytes.clone(), time, attachment: attachment.clone() });
         drop(last);
         output.publisher.put(bytes).attachment(attachment).timestamp(time).wait().map_err(reason_of)
+    }
+
+    /// Waits a little for replies that are under way.
+    fn drain(&self) {
+        let (done, drained) = sync_channel(1);
+        let mark = Box::new(move || drop(done.try_send(())));
+        if self.replier.as_ref().is_some_and(|replier| replier.try_send(mark).is_ok()) {
+            let _ = drained.recv_timeout(DRAIN); // a slow receiver goes without
+        }
     }
 
     fn peers(&self) -> usize {
@@ -617,5 +638,6 @@ pub unsafe extern "C" fn fcsl_zenoh_close(zenoh: *mut Zenoh) {
     }
     // SAFETY: not null, came from Box::into_raw in fcsl_zenoh_open, and ownership ends here.
     let zenoh = unsafe { Box::from_raw(zenoh) };
+    zenoh.drain();
     let _ = zenoh.session.close().wait(); // a timeout: there is nothing to do about it
 }

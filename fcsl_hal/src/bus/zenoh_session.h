@@ -47,7 +47,8 @@ int fcsl_zenoh_declare_answer(fcsl_zenoh_t *session, const char *key, const uint
 
 /* Declares a service, after all outputs: calls `sample` with the payload of a query for `key`. The next fcsl_zenoh_put for the
  * output behind those that were declared, and the services before this one, is its reply. Until then other queries get the bytes
- * of `busy`; one without a payload, or with more than `most` bytes, gets nothing. */
+ * of `busy`; one without a payload, or with more than `most` bytes, gets nothing: `sample` is called
+ * as for a delete, or with a byte more than `most`. */
 int fcsl_zenoh_declare_service(fcsl_zenoh_t *session, uint32_t number, const char *key, size_t most,
                                const uint8_t *busy, size_t busy_size, char *error, size_t error_size);
 

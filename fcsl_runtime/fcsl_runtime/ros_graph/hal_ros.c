@@ -93,6 +93,12 @@ typedef struct {
 } output_t;
 
 typedef struct {
+    fcsl_service_input_t *input;
+    size_t answer_size; /* of an answer that waits for room on the bus; 0: none does */
+    uint8_t answer[SERVICE_RESPONSE_BYTES];
+} service_t;
+
+typedef struct {
     fcsl_log_t log;
     fcsl_run_t *run;
     ros_place_t place;
@@ -101,7 +107,7 @@ typedef struct {
     uint32_t sensor_count;
     output_t *outputs; /* its outputs, actuators and reports */
     uint32_t output_count;
-    fcsl_service_input_t **services; /* the bus's inputs behind those of sensors, and its outputs behind the others */
+    service_t *services; /* the bus's inputs behind those of sensors, and its outputs behind the others */
     uint32_t service_count;
     int has_begun;
     uint8_t *message;
@@ -120,51 +126,60 @@ static int64_t ros_time_ns(void)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-static void answer(hal_t *hal, uint32_t service, const fcsl_service_answer_t *answered)
+/* Posts an answer, or keeps it until there is room: whoever asked waits, and nobody else is heard. */
+static void post_answer(hal_t *hal, service_t *service)
 {
-    uint8_t cdr[SERVICE_RESPONSE_BYTES];
-    const size_t size = service_response_write(cdr, answered);
-    hal->counters.calls_accepted += answered->success;
-    if (fcsl_bus_post(hal->bus, hal->output_count + service, cdr, size) != 0) {
-        hal->counters.commands_dropped++;
+    const uint32_t output = hal->output_count + (uint32_t)(service - hal->services);
+    if (service->answer_size > 0 && fcsl_bus_post(hal->bus, output, service->answer, service->answer_size) == 0) {
+        service->answer_size = 0;
     }
 }
 
-/* The bus hands out one call at a time. */
+static void answer(hal_t *hal, service_t *service, const fcsl_service_answer_t *answered)
+{
+    hal->counters.calls_accepted += answered->success;
+    service->answer_size = service_response_write(service->answer, answered);
+    post_answer(hal, service);
+}
+
+/* The bus hands out one call at a time, and the next one when this has its answer. */
 static void take_calls(hal_t *hal)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
     for (uint32_t i = 0; i < hal->service_count; i++) {
+        service_t *service = &hal->services[i];
         size_t size = 0;
         int value = 0;
         fcsl_service_answer_t refused;
+        post_answer(hal, service);
         if (!hal->has_begun) {
-            fcsl_service_input_begin(hal->services[i], hal->now_ns);
+            fcsl_service_input_begin(service->input, hal->now_ns);
         }
-        if (!fcsl_bus_take(hal->bus, hal->sensor_count + i, hal->message, &size)) {
+        if (!fcsl_service_input_prepare(service->input, hal->now_ns) || service->answer_size > 0 ||
+            !fcsl_bus_take(hal->bus, hal->sensor_count + i, hal->message, &size)) {
             continue;
         }
         if (service_request_read(machine->services[i].kind, hal->message, size, &value) != 0) {
             hal->counters.calls_malformed++;
             refused = (fcsl_service_answer_t){.message = "the request is no CDR of its type"};
-            answer(hal, i, &refused);
-        } else if (fcsl_service_input_call(hal->services[i], value, hal->now_ns, &refused) == 0) {
+            answer(hal, service, &refused);
+        } else if (fcsl_service_input_call(service->input, value, hal->now_ns, &refused) == 0) {
             hal->counters.calls++;
         } else {
-            answer(hal, i, &refused);
+            answer(hal, service, &refused);
         }
     }
     hal->has_begun = 1;
 }
 
-typedef int ended_t(fcsl_service_input_t *input, int64_t now_ns, fcsl_service_answer_t *answered);
+typedef int ended_t(fcsl_service_input_t *input, fcsl_service_answer_t *answered);
 
 static void answer_calls(hal_t *hal, ended_t *ended)
 {
     fcsl_service_answer_t answered;
     for (uint32_t i = 0; i < hal->service_count; i++) {
-        if (ended(hal->services[i], hal->now_ns, &answered)) {
-            answer(hal, i, &answered);
+        if (ended(hal->services[i].input, &answered)) {
+            answer(hal, &hal->services[i], &answered);
         }
     }
 }
@@ -214,16 +229,13 @@ static fcsl_hal_status_t ros_command(void *ctx, const fcsl_message_t *message)
     return FCSL_HAL_OK;
 }
 
-/* At the end of a run no command follows. */
+/* At the end of a run no command follows; and when the machine disarms, its own come behind it. */
 static fcsl_hal_status_t ros_arm(void *ctx, int armed)
 {
     hal_t *hal = ctx;
     const uint8_t *safe = fcsl_run_safe_data(hal->run);
     if (!armed && safe != NULL) {
         post(hal, FCSL_ACTUATOR, safe);
-    }
-    if (!armed) {
-        answer_calls(hal, fcsl_service_input_end);
     }
     return FCSL_HAL_OK;
 }
@@ -267,6 +279,7 @@ static void ros_close(void *ctx)
 {
     hal_t *hal = ctx;
     if (hal->bus != NULL) {
+        answer_calls(hal, fcsl_service_input_end); /* no tick follows */
         (void)fcsl_bus_close(hal->bus, CLOSE_MS);
     }
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
@@ -277,11 +290,11 @@ static void ros_close(void *ctx)
         fcsl_ros_composer_free(hal->outputs[i].composer);
     }
     for (uint32_t i = 0; i < hal->service_count; i++) {
-        fcsl_service_input_free(hal->services[i]);
+        fcsl_service_input_free(hal->services[i].input);
     }
     free(hal->sensors);
     free(hal->outputs);
-    free((void *)hal->services);
+    free(hal->services);
     free(hal->message);
     free(hal);
 }
@@ -403,7 +416,7 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
     size_t longest = MESSAGE_BYTES;
     hal->sensors = calloc(machine->ros_message_count + 1u, sizeof *hal->sensors);
     hal->outputs = calloc(machine->ros_message_count + 1u, sizeof *hal->outputs);
-    hal->services = calloc(machine->service_count + 1u, sizeof(fcsl_service_input_t *));
+    hal->services = calloc(machine->service_count + 1u, sizeof *hal->services);
     if (hal->sensors == NULL || hal->outputs == NULL || hal->services == NULL) {
         return fcsl_fail(error, "out of memory for the ROS 2 graph");
     }
@@ -414,8 +427,8 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
         failed = message->direction == FCSL_SENSOR ? add_sensor(hal, message, error) : add_output(hal, message, error);
     }
     for (uint32_t i = 0; i < machine->service_count && !failed; i++) {
-        hal->services[i] = fcsl_service_input_new(hal->run, i, error);
-        failed = hal->services[i] == NULL;
+        hal->services[i].input = fcsl_service_input_new(hal->run, i, error);
+        failed = hal->services[i].input == NULL;
         hal->service_count += failed ? 0u : 1u;
     }
     hal->message = malloc(longest);

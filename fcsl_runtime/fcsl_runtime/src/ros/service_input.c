@@ -17,9 +17,14 @@ struct fcsl_service_input {
     fcsl_expression_t accepted;
     fcsl_expression_t refused; /* no steps: none */
     uint64_t called_tick;      /* the first tick that sees the call */
+    uint64_t seen_tick;        /* where the run was after its last tick */
     uint8_t waits;
-    uint8_t value; /* of the call that waits */
-    uint8_t rest;  /* what the channel has while none does */
+    uint8_t restored; /* the run is elsewhere since */
+    uint8_t value;  /* of the call that waits */
+    uint8_t before; /* what the channel had, and has again if it fails */
+    uint8_t returns; /* the coming tick gets `before` */
+    uint8_t returned; /* it did, and the tick after that may get a call */
+    uint64_t returned_tick;
 };
 
 static int find(const void *context, const char *path, fcsl_expression_operand_t *operand,
@@ -72,6 +77,13 @@ void fcsl_service_input_free(fcsl_service_input_t *input)
     free(input);
 }
 
+static uint8_t channel_value(const fcsl_service_input_t *input)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(input->run);
+    const fcsl_field_t *field = &machine->fields[machine->channels[input->service->channel].field];
+    return ((const uint8_t *)fcsl_run_data(input->run))[field->offset] != 0;
+}
+
 static void write_channel(fcsl_service_input_t *input, uint8_t value, int64_t now_ns)
 {
     /* The descriptor was checked: a bool of a sensor channel takes 0 and 1. */
@@ -80,8 +92,26 @@ static void write_channel(fcsl_service_input_t *input, uint8_t value, int64_t no
 
 void fcsl_service_input_begin(fcsl_service_input_t *input, int64_t now_ns)
 {
+    const uint8_t kept = input->returns ? input->before : channel_value(input);
     input->waits = 0;
-    write_channel(input, input->rest, now_ns);
+    input->restored = 0;
+    input->returns = 0;
+    input->returned = 0;
+    write_channel(input, input->service->kind == FCSL_SET_BOOL && kept, now_ns);
+}
+
+int fcsl_service_input_prepare(fcsl_service_input_t *input, int64_t now_ns)
+{
+    const uint64_t tick = fcsl_run_tick(input->run);
+    input->restored = input->waits && tick != input->seen_tick;
+    if (input->returns) {
+        input->returns = 0;
+        input->returned = 1;
+        input->returned_tick = tick;
+        write_channel(input, input->before, now_ns);
+    }
+    input->returned = input->returned && tick == input->returned_tick;
+    return !input->returned;
 }
 
 int fcsl_service_input_call(fcsl_service_input_t *input, int value, int64_t now_ns, fcsl_service_answer_t *answer)
@@ -91,9 +121,12 @@ int fcsl_service_input_call(fcsl_service_input_t *input, int value, int64_t now_
         (void)snprintf(answer->message, sizeof answer->message, "busy: another call waits for its answer");
         return -1;
     }
+    const int is_level = input->service->kind == FCSL_SET_BOOL;
     input->waits = 1;
-    input->value = input->service->kind == FCSL_TRIGGER || value != 0;
+    input->before = is_level && channel_value(input);
+    input->value = !is_level || value != 0;
     input->called_tick = fcsl_run_tick(input->run);
+    input->seen_tick = input->called_tick;
     write_channel(input, input->value, now_ns);
     return 0;
 }
@@ -118,45 +151,44 @@ static void say_where(const fcsl_service_input_t *input, const char *what, const
 }
 
 /* A SetBool that was accepted stays; everything else goes back, so that nothing acts after the caller was told that it does not. */
-static void settle(fcsl_service_input_t *input, int accepted, int64_t now_ns)
+static int ended(fcsl_service_input_t *input, const fcsl_service_answer_t *answer)
 {
+    const int stays = answer->success && input->service->kind == FCSL_SET_BOOL;
     input->waits = 0;
-    if (accepted && input->service->kind == FCSL_SET_BOOL) {
-        input->rest = input->value;
-    }
-    if (input->rest != input->value) {
-        write_channel(input, input->rest, now_ns);
-    }
+    input->returns = !stays && input->before != input->value;
+    return 1;
 }
 
-int fcsl_service_input_poll(fcsl_service_input_t *input, int64_t now_ns, fcsl_service_answer_t *answer)
+int fcsl_service_input_poll(fcsl_service_input_t *input, fcsl_service_answer_t *answer)
 {
-    const uint64_t ticks = fcsl_run_tick(input->run) - input->called_tick;
-    if (!input->waits || ticks == 0) {
+    const uint64_t tick = fcsl_run_tick(input->run);
+    if (!input->waits || tick == input->seen_tick) {
         return 0;
     }
+    input->seen_tick = tick;
     *answer = (fcsl_service_answer_t){0};
-    if (holds(&input->refused)) {
+    if (input->restored) { /* the channel has what the checkpoint had */
+        (void)snprintf(answer->message, sizeof answer->message, "a checkpoint was restored before it was answered");
+        input->before = input->value;
+    } else if (holds(&input->refused)) {
         say_where(input, "refused: ", input->service->refused, answer);
     } else if (holds(&input->accepted)) {
         answer->success = 1;
         say_where(input, "accepted", "", answer);
-    } else if (ticks >= input->service->within_ticks) {
+    } else if (tick - input->called_tick >= input->service->within_ticks) {
         say_where(input, "timed out: not ", input->service->accepted, answer);
     } else {
         return 0;
     }
-    settle(input, answer->success, now_ns);
-    return 1;
+    return ended(input, answer);
 }
 
-int fcsl_service_input_end(fcsl_service_input_t *input, int64_t now_ns, fcsl_service_answer_t *answer)
+int fcsl_service_input_end(fcsl_service_input_t *input, fcsl_service_answer_t *answer)
 {
     if (!input->waits) {
         return 0;
     }
     *answer = (fcsl_service_answer_t){0};
     (void)snprintf(answer->message, sizeof answer->message, "the machine stopped before it answered");
-    settle(input, 0, now_ns);
-    return 1;
+    return ended(input, answer);
 }

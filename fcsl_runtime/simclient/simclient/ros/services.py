@@ -33,7 +33,8 @@ class _CAnswer(Structure):
 
 
 class ServiceInput:
-    """Delivers the calls of a service to a run, one after another. `now_ns`: the stamp of samples."""
+    """Delivers the calls of a service to a run, one after another; of each tick: prepare, call, the tick, poll. `now_ns`: the
+    stamp of samples."""
 
     def __init__(self, run: Run, service: Service):
         """Raises TwinError."""
@@ -46,9 +47,14 @@ class ServiceInput:
         weakref.finalize(self, self._library.fcsl_service_input_free, self._handle)
 
     def begin(self, now_ns: int) -> None:
-        """The channel has its value, for the coming tick. No call waits."""
+        """Ticks follow: no call waits, and the channel has a sample for the coming one."""
         self._run.handle()
         self._library.fcsl_service_input_begin(self._handle, now_ns)
+
+    def prepare(self, now_ns: int) -> bool:
+        """Before a tick: whether calls may be taken. Not where a tick has to see first that the last one is over."""
+        self._run.handle()
+        return bool(self._library.fcsl_service_input_prepare(self._handle, now_ns))
 
     def call(self, value: bool, now_ns: int) -> Answer | None:
         """A call, for the coming tick; `value`: that of a SetBool. None: it waits; else another one does."""
@@ -57,15 +63,15 @@ class ServiceInput:
         waits = self._library.fcsl_service_input_call(self._handle, int(value), now_ns, byref(answer)) == 0
         return None if waits else answer.answer
 
-    def poll(self, now_ns: int) -> Answer | None:
+    def poll(self) -> Answer | None:
         """After a tick: the answer of the call that waits, once it has one."""
-        return self._ended(self._library.fcsl_service_input_poll, now_ns)
+        return self._ended(self._library.fcsl_service_input_poll)
 
-    def end(self, now_ns: int) -> Answer | None:
+    def end(self) -> Answer | None:
         """No tick follows: the answer of the call that waits, if one does."""
-        return self._ended(self._library.fcsl_service_input_end, now_ns)
+        return self._ended(self._library.fcsl_service_input_end)
 
-    def _ended(self, function: Callable[..., int], now_ns: int) -> Answer | None:
+    def _ended(self, function: Callable[..., int]) -> Answer | None:
         self._run.handle()
         answer = _CAnswer()
-        return answer.answer if function(self._handle, now_ns, byref(answer)) else None
+        return answer.answer if function(self._handle, byref(answer)) else None
