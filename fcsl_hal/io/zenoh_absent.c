@@ -40,6 +40,12 @@ int fcsl_zenoh_declare_answer(fcsl_zenoh_t *session, const char *key, const uint
     return -1;
 }
 
+int fcsl_zenoh_declare_service(fcsl_zenoh_t *session, uint32_t number, const char *key, size_t most,
+                               const uint8_t *busy, size_t busy_size, char *error, size_t error_size)
+{
+    return -1;
+}
+
 int fcsl_zenoh_declare_token(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size)
 {
     return -1;
