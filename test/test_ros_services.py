@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Services of a machine in a ROS 2 graph, without rclpy: queries of zenoh-plugin-ros2dds and of nodes of rmw_zenoh.
 
-Here Zenoh sessions of Python stand for them; `make interop` has the plugin itself, and a client of rclpy.
+Here Zenoh sessions of Python stand for them.
 """
 
 from __future__ import annotations
